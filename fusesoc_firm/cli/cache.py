@@ -75,7 +75,7 @@ def add_cache(commands: Any) -> None:
 
 
 def _size(text: str) -> int:
-    from fusesoc_firm.builds.store.store import parse_size
+    from fusesoc_firm.builds.store.limited import parse_size
 
     if (size := parse_size(text)) is None:
         raise argparse.ArgumentTypeError(f"'{text}' is not a size; legal: a number of bytes, such as 4096, 500M or 2G")

@@ -22,7 +22,7 @@ from pathlib import Path
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.step import environment
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import StateOf, states
+from fusesoc_firm.builds.step.observed import StateOf, hold, states
 from fusesoc_firm.builds.step.results import Results
 from fusesoc_firm.builds.step.tree import Item, Tree
 from fusesoc_firm.builds.store.packages import version
@@ -101,10 +101,12 @@ class Recall:
     build_root: Path
     # The builds of a command are looked up before any of them runs, so each fact is looked up once for all.
     state_of: StateOf = field(init=False)
-    _states: dict[tuple[str, str], str | None] = field(default_factory=dict)
+    _state: StateOf = field(init=False)
 
     def __post_init__(self) -> None:
         self.state_of = states(self.contents, os.environ.get("PATH", os.defpath))
+        digest = self.contents.digest
+        self._state = cache(lambda kind, name: digest(name) if kind == "file" else state(kind, name))
 
     def builds(self) -> tuple[list[Build], str] | None:
         """Return the builds of the same command in the same state of the libraries, and the digest of this state."""
@@ -149,13 +151,7 @@ class Recall:
         return digest_of([name, scan, str(self.build_root), str(Path.cwd()), self.words, _session()])
 
     def _hold(self, listed: Iterable[Sequence[str | None]]) -> bool:
-        return all(self._state(str(kind), str(name)) == was for kind, name, was in listed)
-
-    def _state(self, kind: str, name: str) -> str | None:
-        if (kind, name) not in self._states:
-            is_file = kind == "file"
-            self._states[kind, name] = self.contents.digest(name) if is_file else state(kind, name)
-        return self._states[kind, name]
+        return hold(((str(kind), str(name), was) for kind, name, was in listed), self._state)
 
 
 @cache

@@ -28,16 +28,14 @@ from fusesoc_firm.builds.step.observed import Fact
 from fusesoc_firm.builds.step.tree import FILE, FOLDER, LINK, PROGRAM, Item
 from fusesoc_firm.builds.store import layout, shared_files
 from fusesoc_firm.builds.store.layout import is_path
+from fusesoc_firm.builds.store.limited import LimitedFolder, limit_of
 from fusesoc_firm.builds.store.remote import Remote, remote_store
-from fusesoc_firm.builds.store.store import parse_size
-from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.digests import default_root, digest, is_digest
 
 FOLDER_NAME = "actions1"
 LIMIT = "FUSESOC_FIRM_ACTIONS_SIZE"
 _AC, _CAS, _NOTES = f"{FOLDER_NAME}/ac", f"{FOLDER_NAME}/cas", f"{FOLDER_NAME}/notes"
 _DEFAULT_LIMIT = "10G"
-_KEPT_OF_LIMIT = 0.8
 _MOST_BYTES = 2**31
 _MOST_RECORD_BYTES = 2**26
 _FACT_PARTS, _ITEM_PARTS = 3, 4
@@ -62,11 +60,9 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Results:
-    """The store of results in the folder `root`, of at most about `limit` bytes, and the remote store."""
+class Results(LimitedFolder):
+    """The store of results, and the remote store."""
 
-    root: Path
-    limit: int
     remote: Remote | None = None
 
     def contents(self) -> Contents:
@@ -81,7 +77,7 @@ class Results:
         """Return the record of an action in the remote store, or None if it is missing or damaged."""
         if self.remote is None or (data := self.remote.entry(key)) is None:
             return None
-        if (found := _record(_parsed(data))) is None:
+        if (found := _record(layout.parsed(data))) is None:
             self.remote.tell_damage(key)
         return found
 
@@ -96,10 +92,10 @@ class Results:
 
     def content(self, name: str) -> bytes | None:
         """Return the content with this digest, or None if it is missing here or damaged."""
-        data = shared_files.read(str(self.root), _place(_CAS, name), _MOST_BYTES)
+        data = shared_files.read(self._root, _place(_CAS, name), _MOST_BYTES)
         if data is None or digest(data) != name:
             return None
-        layout.mark_used(str(self.root), _place(_CAS, name))
+        layout.mark_used(self._root, _place(_CAS, name))
         return data
 
     def content_of(self, record: Record, name: str) -> bytes | None:
@@ -129,8 +125,8 @@ class Results:
     def keep_content(self, data: bytes) -> str:
         """Store a content and return its digest. May raise `OSError`."""
         name = digest(data)
-        if shared_files.state(str(self.root), _place(_CAS, name)) is None or self.content(name) is None:
-            shared_files.write_whole(str(self.root), _place(_CAS, name), data)
+        if shared_files.state(self._root, _place(_CAS, name)) is None or self.content(name) is None:
+            shared_files.write_whole(self._root, _place(_CAS, name), data)
         return name
 
     def restore(self, folder: Path, record: Record) -> bool:
@@ -141,42 +137,18 @@ class Results:
         contents = Contents()
         return all(self._restore(folder / path, item, record, contents) for path, item in record.outputs.items())
 
-    def size(self) -> int:
-        """Return the number of bytes in the store."""
-        return sum(size for _, size, _ in self._files())
-
-    def shrink(self, limit: int) -> int:
-        """Remove the least recently used files until at most `limit` bytes remain; return the number of removed bytes.
-
-        May raise `OSError`.
-        """
-        total = removed = 0
-        for name, size, _ in self._files():
-            total += size
-            if total > limit:
-                removed += shared_files.remove(str(self.root), name)
-        return removed
-
     def shrink_if_needed(self) -> None:
         """Remove the least recently used files if the store exceeds its limit."""
         with suppress(OSError):
-            if self.size() > self.limit:
-                self.shrink(int(self.limit * _KEPT_OF_LIMIT))
+            super().shrink_if_needed()
 
     def clean(self) -> int:
         """Remove all results; return the number of removed bytes. May raise `OSError`."""
-        return shared_files.remove(str(self.root), FOLDER_NAME)
-
-    def remove_damaged(self) -> list[Path]:
-        """Remove damaged files and files that cannot belong to the store; return their paths. May raise `OSError`."""
-        damaged = [name for name, status in self._listed() if not self._is_whole(name, status)]
-        for name in damaged:
-            shared_files.remove(str(self.root), name)
-        return [self.root / name for name in damaged]
+        return shared_files.remove(self._root, FOLDER_NAME)
 
     def number(self) -> int:
         """Return the number of stored results."""
-        return sum(name.startswith(f"{_AC}/") for name, _, _ in self._files())
+        return sum(file.name.startswith(f"{_AC}/") for file in self._files())
 
     def _is_whole(self, name: str, status: os.stat_result) -> bool:
         part, key = name.rpartition("/")[0].rpartition("/")[0], name.rpartition("/")[2]
@@ -187,16 +159,13 @@ class Results:
         return (self.record(key) if part == _AC else self.note(key)) is not None
 
     def _plain(self, name: str) -> object:
-        data = shared_files.read(str(self.root), name, _MOST_RECORD_BYTES)
-        said, _, text = (data or b"").partition(b"\n")
-        if data is None or digest(text).encode() != said:
+        if (data := layout.read(self._root, name, _MOST_RECORD_BYTES)) is None:
             return None
-        layout.mark_used(str(self.root), name)
-        return _parsed(text)
+        layout.mark_used(self._root, name)
+        return layout.parsed(data)
 
     def _keep_plain(self, name: str, data: object) -> None:
-        text = json.dumps(data).encode()
-        shared_files.write_whole(str(self.root), name, digest(text).encode() + b"\n" + text)
+        layout.write(self._root, name, json.dumps(data).encode(), _MOST_RECORD_BYTES)
 
     def _restore(self, path: Path, item: Item, record: Record, contents: Contents) -> bool:
         if item.kind == FOLDER:
@@ -219,36 +188,19 @@ class Results:
         path.chmod(0o755 if item.kind == PROGRAM else 0o644)
         return True
 
-    def _files(self) -> list[tuple[str, int, float]]:
-        """Return the name, the size and the time of last use of each file, the most recently used first."""
-        found = [
-            (name, status.st_size, status.st_mtime) for name, status in self._listed() if stat.S_ISREG(status.st_mode)
-        ]
-        return sorted(found, key=lambda file: (-file[2], file[0]))
-
     def _listed(self) -> list[tuple[str, os.stat_result]]:
-        return [item for part in (_AC, _CAS, _NOTES) for item in shared_files.listed(str(self.root), part)]
+        return [item for part in (_AC, _CAS, _NOTES) for item in shared_files.listed(self._root, part)]
 
 
 def default_results(environment: Mapping[str, str] = os.environ) -> Results:
     """Return the store that the environment variables select. Raise `InputError` if the limit is not a size."""
-    limit = environment.get(LIMIT) or _DEFAULT_LIMIT
-    if (size := parse_size(limit)) is None:
-        fail(f"{LIMIT} is '{limit}', which is not a size", hint="legal: a number of bytes, such as 500M or 20G")
+    limit = limit_of(environment, LIMIT, _DEFAULT_LIMIT, "500M or 20G")
     root = default_root(environment)
-    return Results(Path(root), size, remote_store(environment, root))
+    return Results(Path(root), limit, remote_store(environment, root))
 
 
 def _place(part: str, name: str) -> str:
     return f"{part}/{name[:2]}/{name}"
-
-
-def _parsed(text: bytes) -> object:
-    """Return the data in a JSON text, or None if the text is invalid or nested too deeply."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return None
 
 
 def _plain(record: Record) -> dict[str, object]:

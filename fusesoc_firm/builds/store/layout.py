@@ -56,10 +56,10 @@ def place(digest: str, suffix: str) -> str:
     return f"{LAYOUT}/{digest[:2]}/{digest}{suffix}"
 
 
-def write(root: str, name: str, data: bytes) -> None:
-    """Write data with its digest to the store. May raise `OSError`."""
+def write(root: str, name: str, data: bytes, most: int = 0) -> None:
+    """Write data with its digest to the store; `most` replaces the size limit of such files. May raise `OSError`."""
     whole = digest(data).encode() + b"\n" + data
-    if len(whole) > _most(name):
+    if len(whole) > (most or _most(name)):
         raise OSError(EFBIG, os.strerror(EFBIG))
     shared_files.write_whole(root, name, whole)
 
@@ -75,9 +75,9 @@ def entry_data(about: Mapping[str, str], files: Mapping[str, bytes]) -> bytes:
     return b"".join([json.dumps(header).encode(), b"\n", *files.values()])
 
 
-def read(root: str, name: str) -> bytes | None:
-    """Return the data in a file after the digest, or None if the file is missing or damaged."""
-    found = shared_files.read(root, name, _most(name))
+def read(root: str, name: str, most: int = 0) -> bytes | None:
+    """Return the data in a file after the digest, or None if the file is missing or damaged; `most` as for `write`."""
+    found = shared_files.read(root, name, most or _most(name))
     if found is None:
         return None
     said, _, data = found.partition(b"\n")
@@ -144,9 +144,12 @@ def _most(name: str) -> int:
 
 
 def _plain(data: bytes | None) -> object:
+    """Return the data in a JSON text, or None if the text is missing, invalid, too long or nested too deeply."""
+    return parsed(data) if data and len(data) <= MOST_PLAIN_BYTES else None
+
+
+def parsed(data: bytes) -> object:
     """Return the data in a JSON text, or None if the text is invalid or nested too deeply."""
-    if not data or len(data) > MOST_PLAIN_BYTES:
-        return None
     try:
         return json.loads(data)
     except (ValueError, RecursionError):

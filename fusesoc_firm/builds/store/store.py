@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import stat
 import sys
 import time
@@ -28,9 +27,9 @@ from pathlib import Path
 
 from fusesoc_firm.builds.store import layout, shared_files
 from fusesoc_firm.builds.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, place
+from fusesoc_firm.builds.store.limited import LimitedFolder, StoredFile, limit_of
 from fusesoc_firm.builds.store.packages import version
 from fusesoc_firm.builds.store.remote import Remote, remote_store
-from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
 from fusesoc_firm.tools.digests import default_root, digest, digest_of
@@ -42,9 +41,6 @@ Files = Mapping[str, bytes]
 _FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"
 _SERVED = "served"
-_UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-# Shrinking leaves a margin, so that the limit is not exceeded again immediately.
-_KEPT_OF_LIMIT = 0.8
 # A process that writes many entries looks through the store after each such part of the limit.
 _PART_OF_LIMIT = 1 / 64
 # The process that holds a lock may be stopped, or its machine may be down. This limit exceeds the time to generate a
@@ -78,23 +74,12 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class StoredFile:
-    """A file in the store: its name, its size in bytes, and the time of last use in seconds since the epoch."""
-
-    name: str
-    size: int
-    used: float
-
-
-@dataclass(frozen=True)
-class Store:
-    """A store of at most about `limit` bytes in the folder `root`, which is created by the first write.
+class Store(LimitedFolder):
+    """A store of generated files.
 
     Entries that are missing here are obtained from the `remote` store, and built entries are written to both.
     """
 
-    root: Path
-    limit: int
     remote: Remote | None = None
 
     def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
@@ -131,38 +116,10 @@ class Store:
         """Return all entries in the order of last use, the most recent first."""
         return [file for file in self._files() if file.name.endswith(ENTRY)]
 
-    def size(self) -> int:
-        """Return the number of bytes that count against the limit."""
-        return sum(file.size for file in self._files())
-
     def is_writable(self) -> bool:
         """Return whether this user may add entries, which is also the case if the store's folder is missing."""
         there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
         return there is None or os.access(there, os.W_OK)
-
-    def remove_damaged(self) -> list[Path]:
-        """Remove damaged files and files that cannot belong to a store; return their paths. May raise `OSError`."""
-        damaged = []
-        for name, status in self._listed():
-            is_kept = name.endswith(KEPT)
-            is_good = stat.S_ISREG(status.st_mode) and (not is_kept or layout.is_whole(self._root, name))
-            # If the file is missing, another process has removed it.
-            if not is_good and shared_files.state(self._root, name) is not None:
-                shared_files.remove(self._root, name)
-                damaged.append(self.root / name)
-        return damaged
-
-    def shrink(self, limit: int) -> int:
-        """Remove the least recently used files until at most `limit` bytes remain; return the number of removed bytes.
-
-        May raise `OSError`.
-        """
-        total = removed = 0
-        for file in self._files():
-            total += file.size
-            if total > limit:
-                removed += shared_files.remove(self._root, file.name)
-        return removed
 
     def clean(self) -> int:
         """Remove the whole store, including older formats; return the number of removed bytes. May raise `OSError`."""
@@ -226,52 +183,33 @@ class Store:
 
     def shrink_if_needed(self) -> None:
         """Remove old files if the store exceeds its limit, and abandoned temporary files. May raise `OSError`."""
-        if self.size() > self.limit:
-            self.shrink(int(self.limit * _KEPT_OF_LIMIT))
+        super().shrink_if_needed()
         for name, status in self._listed():
             is_abandoned = status.st_mtime < time.time() - _ABANDONED_SECONDS
             if is_abandoned and name.rpartition("/")[2].startswith(TEMPORARY):
                 with suppress(OSError):
                     shared_files.remove(self._root, name)
 
-    def _files(self) -> list[StoredFile]:
-        """Return the files that count against the limit, the most recently used first."""
-        found = [
-            StoredFile(name, status.st_size, status.st_mtime)
-            for name, status in self._listed()
-            if name.endswith(KEPT) and stat.S_ISREG(status.st_mode)
-        ]
-        return sorted(found, key=lambda file: (-file.used, file.name))
-
     def _listed(self) -> list[tuple[str, os.stat_result]]:
         return shared_files.listed(self._root, LAYOUT)
 
-    @property
-    def _root(self) -> str:
-        return str(self.root)
+    def _counts(self, name: str) -> bool:
+        return name.endswith(KEPT)
+
+    def _is_whole(self, name: str, status: os.stat_result) -> bool:
+        return stat.S_ISREG(status.st_mode) and (not name.endswith(KEPT) or layout.is_whole(self._root, name))
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
     """Return the store selected by the environment variables. Raise `InputError` if a value is illegal."""
-    limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
-    if (size := parse_size(limit)) is None:
-        fail(
-            f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is not a size",
-            hint="legal: a number of bytes, such as 4096, 500M or 2G",
-        )
+    limit = limit_of(environment, "FUSESOC_FIRM_CACHE_SIZE", _DEFAULT_LIMIT, "4096, 500M or 2G")
     root = default_root(environment)
-    return Store(Path(root), size, remote_store(environment, root))
+    return Store(Path(root), limit, remote_store(environment, root))
 
 
 def served_store(limit: int, environment: Mapping[str, str] = os.environ) -> Store:
     """Return the store of the data that other machines write to this one, with a separate limit."""
     return Store(Path(default_root(environment), _SERVED), limit)
-
-
-def parse_size(text: str) -> int | None:
-    """Return the number of bytes in a text such as `5G` (K, M, G, T: powers of 1024), or None if it is invalid."""
-    found = re.fullmatch(r"(\d+)([KMGT]?)", text.strip().upper())
-    return int(found[1]) * _UNITS[found[2]] if found else None
 
 
 def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: str) -> str:

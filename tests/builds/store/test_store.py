@@ -19,13 +19,13 @@ import pytest
 from fusesoc_firm.builds.store import shared_files
 from fusesoc_firm.builds.store import store as store_module
 from fusesoc_firm.builds.store.layout import read_entry
+from fusesoc_firm.builds.store.limited import parse_size
 from fusesoc_firm.builds.store.store import (
     Entry,
     Files,
     Key,
     Store,
     default_store,
-    parse_size,
     request_digest,
 )
 from fusesoc_firm.text.diagnostics import InputError
