@@ -8,8 +8,8 @@ from fusesoc_firm.converter.segments import segments_of
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.bypass import part_segments, whole_ports
 from fusesoc_firm.system.derived.model import AcceleratorType, MessageSide
-from fusesoc_firm.system.derived.sides import SidePort, accelerator_ports, side_ports
-from fusesoc_firm.system.hardware.instances import component
+from fusesoc_firm.system.derived.sides import SidePort, side_ports
+from fusesoc_firm.system.hardware.instances import component, declarations
 from fusesoc_firm.text.render import Context
 
 BYPASS_TEMPLATE = "vhdl/bypass.vhd"
@@ -32,7 +32,7 @@ def bypass_configuration(type_: AcceleratorType) -> Context:
         "is_component": type_.inner.is_component,
         "has_width": type_.inner.has_width,
         "width": type_.width,
-        "ports": [*_declarations(type_), *_pins(type_)],
+        "ports": [*declarations(type_), *_pins(type_)],
         "pins": [str(pin.name) for pin in type_.accelerator.pins],
         "is_fixed": source.frame.is_fixed_size,
         "waits_for_end": last == segments - 1 and not _is_followed(source, last),
@@ -55,18 +55,6 @@ def _is_followed(source: MessageSide, segment: int) -> bool:
     The part passes only after the response, so the accelerator cannot wait for a complete and correct message.
     """
     return not source.frame.is_fixed_size and segment in segments_of(source.frame).parts.values()
-
-
-def _declarations(type_: AcceleratorType) -> list[Context]:
-    return [
-        {
-            "name": f"{prefix}{port.name}",
-            "direction": "out" if port.is_output else "in",
-            "type": vhdl_type(port.width),
-            "comment": port.comment,
-        }
-        for prefix, port in accelerator_ports(type_)
-    ]
 
 
 def _pins(type_: AcceleratorType) -> list[Context]:

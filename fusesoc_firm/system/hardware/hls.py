@@ -15,8 +15,9 @@ from fusesoc_firm.system.derived.cpp_function import (
 )
 from fusesoc_firm.system.derived.cpp_stream import is_streamed
 from fusesoc_firm.system.derived.model import AcceleratorType
-from fusesoc_firm.system.hardware.hls_names import declarations, named
+from fusesoc_firm.system.hardware.hls_names import named
 from fusesoc_firm.system.hardware.hls_stream import stream_kernel, stream_shim, stream_wrapper
+from fusesoc_firm.system.hardware.instances import declarations
 from fusesoc_firm.text.render import Context, Rendering
 
 _WRAPPER_TEMPLATE = "vhdl/hls_wrapper.vhd"

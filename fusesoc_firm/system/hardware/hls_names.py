@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.cpp_function import function_name, kernel_entity, library_name
 from fusesoc_firm.system.derived.model import AcceleratorType
-from fusesoc_firm.system.derived.sides import accelerator_ports
 from fusesoc_firm.text.render import Context
 
 
@@ -20,16 +18,3 @@ def named(accelerator: AcceleratorType) -> Context:
         "source": str(PurePosixPath(accelerator.accelerator.sources[0]).name),
         "library": library_name(accelerator),
     }
-
-
-def declarations(accelerator: AcceleratorType) -> list[Context]:
-    """Return the declarations of the ports of an accelerator's message sides."""
-    return [
-        {
-            "name": f"{prefix}{port.name}",
-            "direction": "out" if port.is_output else "in",
-            "type": vhdl_type(port.width),
-            "comment": port.comment,
-        }
-        for prefix, port in accelerator_ports(accelerator)
-    ]

@@ -8,7 +8,8 @@ from fusesoc_firm.converter.message_ports import segment_count
 from fusesoc_firm.system.derived.cpp_function import AP_PORTS, WORD_BITS, streams
 from fusesoc_firm.system.derived.cpp_stream import Channel
 from fusesoc_firm.system.derived.model import AcceleratorType, LengthSource, MessageSide
-from fusesoc_firm.system.hardware.hls_names import declarations, named
+from fusesoc_firm.system.hardware.hls_names import named
+from fusesoc_firm.system.hardware.instances import declarations
 from fusesoc_firm.text.render import Context, Rendering
 
 _WRAPPER_TEMPLATE = "vhdl/hls_stream_wrapper.vhd"

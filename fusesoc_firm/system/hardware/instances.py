@@ -212,5 +212,18 @@ def component(type_: AcceleratorType) -> dict[str, Any]:
     }
 
 
+def declarations(accelerator: AcceleratorType) -> list[dict[str, Any]]:
+    """Return the declarations of the ports of an accelerator's message sides."""
+    return [
+        {
+            "name": f"{prefix}{port.name}",
+            "direction": "out" if port.is_output else "in",
+            "type": vhdl_type(port.width),
+            "comment": port.comment,
+        }
+        for prefix, port in accelerator_ports(accelerator)
+    ]
+
+
 def _instance(names: Names, block: str, entity: str) -> dict[str, Any]:
     return {"block": block, "label": names.label(block), "entity": entity}
