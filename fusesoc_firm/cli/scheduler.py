@@ -117,9 +117,10 @@ def selection_of(arguments: argparse.Namespace) -> Selection:
 
 
 def _bench_schedulers(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.scheduling.evaluation.bench import Places, bench
+    from fusesoc_firm.scheduling.evaluation.bench import bench
+    from fusesoc_firm.tools.workers import chosen_workers
 
-    bench(selection_of(arguments), Places(arguments.jobs, arguments.cluster), arguments.csv)
+    bench(selection_of(arguments), chosen_workers(arguments.jobs, arguments.cluster), arguments.csv)
 
 
 def _choose_scheduler(arguments: argparse.Namespace) -> None:

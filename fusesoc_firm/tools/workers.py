@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from ipaddress import ip_address
@@ -63,6 +63,11 @@ def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Resul
     done, _ = wait(pending, return_when=FIRST_COMPLETED)
     for future in done:
         yield pending.pop(future), future.result()
+
+
+def chosen_workers(jobs: int | None, cluster: str | None) -> AbstractContextManager[Workers]:
+    """Return the workers of the Dask cluster at an address or, without an address, processes on this machine."""
+    return cluster_workers(cluster) if cluster else local_workers(jobs)
 
 
 @contextmanager

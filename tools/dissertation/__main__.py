@@ -14,9 +14,10 @@ from pathlib import Path
 
 from fusesoc_firm.cli.scheduler import add_evaluations, selection_of
 from fusesoc_firm.scheduling import area
-from fusesoc_firm.scheduling.evaluation.bench import Places, Selection, evaluated, heading, settings_text
+from fusesoc_firm.scheduling.evaluation.bench import Selection, evaluated, heading, settings_text
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.outputs import make_folder
+from fusesoc_firm.tools.workers import chosen_workers
 from tools.dissertation import chapter, code, pictures
 from tools.dissertation.tables import Figure, Table, figure_csv, figure_markdown, markdown, table_csv
 from tools.dissertation.timeline import Timeline, timelines
@@ -33,7 +34,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         make_folder(arguments.output)
         selection = selection_of(arguments)
-        means = evaluated(selection, Places(arguments.jobs, arguments.cluster))
+        means = evaluated(selection, chosen_workers(arguments.jobs, arguments.cluster))
         print(write(chapter.Evaluation(means, area.measured()), selection, arguments.output))
     except InputError as error:
         print(error, file=sys.stderr)

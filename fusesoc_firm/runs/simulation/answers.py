@@ -17,7 +17,7 @@ from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode, field_ranges
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.runs.simulation.host_files import leaves, value_text
+from fusesoc_firm.runs.simulation.host_files import differences, leaves, value_text
 from fusesoc_firm.system.derived.model import Converter, Topic
 
 _FILES = ("stimulus.txt", "expected.txt", "received.txt")
@@ -92,9 +92,10 @@ class Answer:
         """The wrong fields by dotted names; fields whose values look equal are omitted."""
         found: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
         if self.received.message:
-            for name, *texts in _differences(self.expected.message, self.received.message):
-                if max(map(len, texts)) <= _LONGEST:
-                    found[re.sub(r"\[\d+\]", "", name)].append((name, texts[0], texts[1]))
+            for name, *values in differences(self.expected.message, self.received.message):
+                expected, received = map(value_text, values)
+                if max(len(expected), len(received)) <= _LONGEST:
+                    found[re.sub(r"\[\d+\]", "", name)].append((name, expected, received))
         return {field: WrongField(*items[0], len(items) - 1) for field, items in found.items()}
 
     def wrong_fields(self, name: str) -> list[WrongField]:
@@ -220,17 +221,3 @@ def _frames(text: str) -> Iterator[tuple[str, str]]:
             if len(lines) > 1:
                 yield label, "".join(lines)
             label, lines = line[2:], [""]
-
-
-def _differences(expected: Any, received: Any, name: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield the dotted name and both texts of each value that differs."""
-    if repr(expected) == repr(received):
-        return
-    if isinstance(expected, dict):
-        for key, value in expected.items():
-            yield from _differences(value, received[key], f"{name}.{key}" if name else key)
-    elif isinstance(expected, list | bytes) and len(expected) == len(received):
-        for number, pair in enumerate(zip(expected, received, strict=True)):
-            yield from _differences(*pair, f"{name}[{number}]")
-    else:
-        yield name, value_text(expected), value_text(received)

@@ -25,7 +25,7 @@ def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter],
     lines: list[str] = []
     for stimulus in stimuli:
         lines.append(f"> {_label(stimulus.subscriber, stimulus.message)}")
-        lines += _hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload, id_bytes), None)
+        lines += hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload, id_bytes))
     return "\n".join(lines) + "\n"
 
 
@@ -38,7 +38,7 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
         cause = "" if response.cause is None else f"@{response.cause} "
         lines.append(f"< {cause}{_label(publisher, response.message)}")
         used = b"\1" * (id_bytes + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
-        lines += _hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
+        lines += hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
     return "\n".join(lines) + "\n"
 
 
@@ -80,7 +80,7 @@ def _frame_of(label: str, text: str) -> bytes:
     return bytes.fromhex("".join(takewhile(lambda line: line.startswith("  "), lines)).replace("..", "00"))
 
 
-def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
+def hex_lines(frame: bytes, used: bytes | None = None) -> Iterator[str]:
     """Yield the frame's bytes in hex; an unused byte is written as `..`."""
     digits = [f"{byte:02x}" if used is None or used[index] else ".." for index, byte in enumerate(frame)]
     for first in range(0, len(digits), _BYTES_A_LINE):
@@ -128,6 +128,20 @@ def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from leaves(inner, f"{name}.{key}" if name else key)
     else:
         yield name, value
+
+
+def differences(expected: Any, received: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield the dotted name and both values of each value that differs between two messages."""
+    if repr(expected) == repr(received):
+        return
+    if isinstance(expected, Mapping):
+        for key, value in expected.items():
+            yield from differences(value, received[key], f"{name}.{key}" if name else key)
+    elif isinstance(expected, list | bytes) and len(expected) == len(received):
+        for number, pair in enumerate(zip(expected, received, strict=True)):
+            yield from differences(*pair, f"{name}[{number}]")
+    else:
+        yield name, expected, received
 
 
 def is_zero(value: Any) -> bool:

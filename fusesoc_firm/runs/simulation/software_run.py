@@ -9,17 +9,17 @@ A block without sources is software in another program; the stimuli contain its 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from fusesoc_firm.accelerator.functions import Functions, Message, importable_sources
 from fusesoc_firm.accelerator.software import sent_elsewhere, way_to
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.values import shown
+from fusesoc_firm.runs.simulation.host_files import differences
 from fusesoc_firm.runs.simulation.reference import Response
 from fusesoc_firm.runs.simulation.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
@@ -150,20 +150,9 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
             payload = encode_used(topic.frame, message)
             if payload != response.payload:
                 sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
-                name, *values = next(_differences(sent, said, ""), ("it", sent, said))
+                name, *values = next(differences(sent, said), ("", sent, said))
                 one, other = map(shown, values)
-                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but the model has {other}")
+                what = f"'{name}'" if name else "it"
+                fail(f"message {number} from software to '{topic.block}': {what} is {one}, but the model has {other}")
         if len(found) != len(wanted):
             fail(f"software sends {len(found)} messages to '{topic.block}', but the model sends {len(wanted)}")
-
-
-def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the path and both values of each difference between two messages."""
-    if isinstance(one, Mapping):
-        for name, value in one.items():
-            yield from _differences(value, other[name], f"{path}.{name}" if path else name)
-    elif isinstance(one, list | bytes) and len(one) == len(other):
-        for number, pair in enumerate(zip(one, other, strict=True)):
-            yield from _differences(*pair, f"{path}[{number}]")
-    elif one != other:
-        yield f"'{path}'", one, other

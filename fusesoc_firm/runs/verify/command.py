@@ -8,7 +8,6 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from fusesoc_firm.runs.verify.simulation import ghdl
 from fusesoc_firm.runs.verify.task import Verdict
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, make_folder
-from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
+from fusesoc_firm.tools.workers import chosen_workers
 
 _SHOWN = 20
 
@@ -60,7 +59,7 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
     started = time.monotonic()
     entries: list[Entry] = []
     bar = tqdm(total=len(names), unit="msg", disable=None, file=sys.stderr)
-    with _workers(places) as workers, bar:
+    with chosen_workers(places.jobs, places.cluster) as workers, bar:
         failed = 0
         for entry in run(library, names, settings, workers):
             entries.append(entry)
@@ -81,10 +80,6 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
         fail(f"{totals[Verdict.FAIL]} of {len(entries)} messages failed")
     if not totals[Verdict.PASS]:
         fail("no message could be verified")
-
-
-def _workers(places: Places) -> AbstractContextManager[Workers]:
-    return cluster_workers(places.cluster) if places.cluster else local_workers(places.jobs)
 
 
 def _keep(entry: Entry, folder: Path | None) -> None:

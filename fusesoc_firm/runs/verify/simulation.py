@@ -8,18 +8,18 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from fusesoc_firm.core.core_reader import read_core
+from fusesoc_firm.runs.simulation.host_files import hex_lines
 from fusesoc_firm.runs.verify.loop import ENTITY
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.library_path import library_root
 
 STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"
-BYTES_PER_LINE = 64
 STALL_PERCENT = 30
 # In seconds. The host gives up on hanging hardware much earlier, so this limit only stops a simulation without
 # progress.
@@ -81,10 +81,14 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
     """Write the host's files (docs/reference/simulation-host.md): stimulus k causes only response k."""
-    sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
-    expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
-    (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")
-    (folder / EXPECTED_FILE).write_text("".join(expected), encoding="ascii")
+    _write(folder / STIMULUS_FILE, ((f"> stimulus {number}", frame) for number, frame in enumerate(stimuli)))
+    headed = ((f"< @{number} answer to stimulus {number}", frame) for number, frame in enumerate(answers))
+    _write(folder / EXPECTED_FILE, headed)
+
+
+def _write(path: Path, frames: Iterable[tuple[str, bytes]]) -> None:
+    lines = [line for heading, frame in frames for line in (heading, *hex_lines(frame))]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 @cache
@@ -122,11 +126,6 @@ def _analysed_library() -> Path:
     files = [str(path) for path in core_files()]
     subprocess.run([ghdl(), "-a", *_OPTIONS, "--work=firm", f"--workdir={folder}", *files], check=True)
     return Path(folder)
-
-
-def _hex_lines(frame: bytes) -> str:
-    starts = range(0, len(frame), BYTES_PER_LINE)
-    return "".join(f"  {frame[start : start + BYTES_PER_LINE].hex()}\n" for start in starts)
 
 
 def _detail(output: str) -> str:

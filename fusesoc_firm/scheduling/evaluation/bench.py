@@ -17,7 +17,7 @@ from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS
 from fusesoc_firm.scheduling.tables import decimal, grid
 from fusesoc_firm.text.diagnostics import fail, nearest
 from fusesoc_firm.text.outputs import check_output
-from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
+from fusesoc_firm.tools.workers import Workers
 
 Means = Mapping[Key, Mapping[str, float]]
 """The mean of each metric over the sets of a data set, by evaluation."""
@@ -36,19 +36,7 @@ class Selection:
     settings: Settings
 
 
-@dataclass(frozen=True)
-class Places:
-    """The places where the jobs run: a number of processes on this machine, or a cluster's address."""
-
-    jobs: int | None = None
-    cluster: str | None = None
-
-    def workers(self) -> AbstractContextManager[Workers]:
-        """Return the workers as a context."""
-        return cluster_workers(self.cluster) if self.cluster else local_workers(self.jobs)
-
-
-def bench(selection: Selection, places: Places, csv: Path | None = None) -> None:
+def bench(selection: Selection, workers: AbstractContextManager[Workers], csv: Path | None = None) -> None:
     """Run the evaluations, print a summary, and write all values to `csv`.
 
     Raise `InputError` before the first evaluation if the file cannot be written.
@@ -56,7 +44,7 @@ def bench(selection: Selection, places: Places, csv: Path | None = None) -> None
     if csv:
         _check(csv)
     started = time.monotonic()
-    means = evaluated(selection, places)
+    means = evaluated(selection, workers)
     seconds = time.monotonic() - started
     for data_set in selection.data_sets:
         print(f"## {heading(data_set, selection.settings)}\n\n{_summary(means, data_set)}")
@@ -66,14 +54,14 @@ def bench(selection: Selection, places: Places, csv: Path | None = None) -> None
         print(csv)
 
 
-def evaluated(selection: Selection, places: Places) -> Means:
+def evaluated(selection: Selection, workers: AbstractContextManager[Workers]) -> Means:
     """Run the evaluations with a progress bar, and return their means by the sorted keys."""
     to_do = jobs(selection.data_sets, selection.policies, selection.requesters, selection.settings)
     print(settings_text(selection.settings), file=sys.stderr)
     found = {}
     bar = tqdm(total=len(to_do), unit="run", disable=None, file=sys.stderr)
-    with places.workers() as workers, bar:
-        for outcome in run(to_do, workers):
+    with workers as started, bar:
+        for outcome in run(to_do, started):
             key = outcome.key
             found[key] = outcome.metrics.means()
             bar.set_postfix_str(f"{key.data_set}, {key.policy}, {key.requesters}", refresh=False)

@@ -26,7 +26,7 @@ from fusesoc_firm.frame.model import Fixed, Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.runs.verify import command, simulation, task
+from fusesoc_firm.runs.verify import simulation, task
 from fusesoc_firm.runs.verify.definitions import NoJudgementError
 from fusesoc_firm.runs.verify.judge import Judgement, judge
 from fusesoc_firm.runs.verify.task import Result, Task, Verdict, verify
@@ -271,7 +271,7 @@ def in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
         with ThreadPoolExecutor(2) as executor:
             yield Workers(executor, 2)
 
-    monkeypatch.setattr(command, "local_workers", threads)
+    monkeypatch.setattr(workers, "local_workers", threads)
 
 
 def test_a_message_without_a_judge_is_no_success(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
