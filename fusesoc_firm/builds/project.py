@@ -11,7 +11,6 @@ from fusesoc_firm.builds.call.answer import Basis, load, obtain
 from fusesoc_firm.builds.call.calls import make_request
 from fusesoc_firm.builds.call.generators import GENERATORS, MESSAGES
 from fusesoc_firm.builds.call.lock_file import Lock, check_lock, lock_of, lock_path, lock_text, read_lock
-from fusesoc_firm.builds.call.message_core import folders
 from fusesoc_firm.builds.setup.cores import (
     ProjectCore,
     affected,
@@ -99,7 +98,7 @@ def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
         requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
             fail(f"no known core '{name}' provides messages", source)
-        found += [folder for request in requests if request for folder in folders(request)]
+        found += [folder for request in requests if request for folder in request.definition_folders()]
     return tuple(found)
 
 

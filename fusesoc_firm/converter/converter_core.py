@@ -23,11 +23,8 @@ VHDL = "vhdlSource-93"
 
 def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
     """Return the sources of a request's messages as arguments for `MessageLibrary`."""
-    paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
-    assert isinstance(paths, list)
-    folders = [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
-    return folders, os.environ, None if distro is None else str(distro)
+    return request.definition_folders(), os.environ, None if distro is None else str(distro)
 
 
 def load(request: Request) -> LoadedRequest:

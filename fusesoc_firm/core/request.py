@@ -88,6 +88,11 @@ class Request:
         places = self.places.get(parameter, ())
         return dict(zip(items, places if len(places) == len(items) else [None] * len(items), strict=True))
 
+    def definition_folders(self) -> list[Path]:
+        """Return the folders in `paths`, then those of the cores in `messages`. May raise `InputError`."""
+        paths = (self.files_root / path for path in self.listed("paths"))
+        return [*paths, *self.message_folders.of(self.listed("messages"))]
+
 
 @dataclass(frozen=True)
 class GeneratedFile:

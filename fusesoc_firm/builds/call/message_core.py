@@ -16,13 +16,6 @@ from fusesoc_firm.message.middleware import known_suffixes
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 
 
-def folders(request: Request) -> list[Path]:
-    """Return the folders with a core's messages: the core's own folders, then the folders of the listed cores."""
-    paths = request.parameters["paths"] or []
-    assert isinstance(paths, list)
-    return [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
-
-
 def load(request: Request) -> LoadedRequest:
     """Load a core with all definitions, including those of the listed cores, in one folder per package."""
     found = list(_files(request))
@@ -51,7 +44,7 @@ def request_place(request: Request) -> SourceRef | None:
 
 def _files(request: Request) -> Iterator[tuple[str, Path]]:
     """Yield every file with its name in the generated core."""
-    for folder in folders(request):
+    for folder in request.definition_folders():
         for kind, files in interface_files(folder, known_suffixes()).items():
             for name, paths in files.items():
                 for path in paths:
