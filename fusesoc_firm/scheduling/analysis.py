@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from math import floor, inf
 
 from fusesoc_firm.scheduling import area, response
@@ -208,16 +209,14 @@ def _turns(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
     return [response.taking_turns(task, _others(task, tasks), overheads) for task in tasks]
 
 
-def _edf(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
-    lateness = response.edf_by_demand(tasks, overheads)
-    counted = (response.edf_by_counting(task, _others(task, tasks), overheads) for task in tasks)
-    return [_least(task, lateness, bound) for task, bound in zip(tasks, counted, strict=True)]
-
-
-def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
-    lateness = response.lst_by_demand(tasks, overheads)
-    counted = (response.lst_by_counting(task, _others(task, tasks), overheads) for task in tasks)
-    return [_least(task, lateness, bound) for task, bound in zip(tasks, counted, strict=True)]
+def _deadlines(
+    by_demand: Callable[[Sequence[Task], Overheads], float],
+    by_counting: Callable[[Task, Sequence[Task], Overheads], int],
+    tasks: Sequence[Task],
+    overheads: Overheads,
+) -> list[int | None]:
+    lateness = by_demand(tasks, overheads)
+    return [_least(task, lateness, by_counting(task, _others(task, tasks), overheads)) for task in tasks]
 
 
 def _least(task: Task, lateness: float, counted: int) -> int:
@@ -227,8 +226,8 @@ def _least(task: Task, lateness: float, counted: int) -> int:
 
 _RESPONSES: Mapping[Order, Callable[[Sequence[Task], Overheads], list[int | None]]] = {
     Order.TURNS: _turns,
-    Order.DEADLINE: _edf,
-    Order.SLACK: _lst,
+    Order.DEADLINE: partial(_deadlines, response.edf_by_demand, response.edf_by_counting),
+    Order.SLACK: partial(_deadlines, response.lst_by_demand, response.lst_by_counting),
     Order.OTHER: lambda tasks, _: [None] * len(tasks),
 }
 
