@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import Fact
 from fusesoc_firm.builds.step.results import Record, Results
 from fusesoc_firm.builds.step.tree import FILE, FOLDER, LINK, PROGRAM, Item, Tree, changed, in_order_of_time, tree_of
 from fusesoc_firm.tools.digests import digest_of
+from fusesoc_firm.tools.facts import Fact
 
 STORE = "FIRM_TEST_STORE"
 """The variable with the folder of what lasts from one run of tests to the next."""

@@ -12,7 +12,7 @@ If no state changes, the result is unchanged. Every hit loads this module, so it
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from fusesoc_firm.text.files import read_file
 from fusesoc_firm.tools import own_code
@@ -24,10 +24,18 @@ _BYTE_CODE = "__pycache__"
 Fact = tuple[str, str, str | None]
 """The kind, name and state of a fact; the state of a missing object is None."""
 
+StateOf = Callable[[str, str], str | None]
+"""A function that returns the current state of the fact with this kind and name."""
+
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
     """Return the facts of one kind in their current states."""
     return [(kind, name, state(kind, name)) for name in names]
+
+
+def hold(noted: Iterable[Sequence[str | None]], state_of: StateOf) -> bool:
+    """Return whether all facts are in their noted states."""
+    return all(state_of(str(kind), str(name)) == was for kind, name, was in noted)
 
 
 def state(kind: str, name: str) -> str | None:

@@ -9,8 +9,6 @@ rewrite the file, without our parts, if a core were missing in the list.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -26,6 +24,7 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.files import read_regular
 from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
+from fusesoc_firm.tools.digests import digest, digest_of
 from fusesoc_firm.tools.programs import debian_package, facts_of, installed_programs, packages
 from fusesoc_firm.tools.reads import Input
 
@@ -154,7 +153,7 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
         origin = os.path.relpath(Path(origin).resolve(), folder)
     return {
         "source": origin,
-        "sha256": hashlib.sha256(library.content(name)).hexdigest(),
+        "sha256": digest(library.content(name)),
         "signature": signature(name, library.closure(name)),
     }
 
@@ -166,11 +165,7 @@ def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> st
     """
     folder = core.files[0].parent
     made_of = [item for loaded in generated for item in loaded.inputs]
-    return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
-
-
-def _digest_of(found: Mapping[str, str | None]) -> str:
-    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+    return digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
 
 
 def _named(item: Input, folder: Path) -> str:
@@ -182,8 +177,8 @@ def _named(item: Input, folder: Path) -> str:
 
 def _digest(item: Input) -> str | None:
     if not isinstance(item, Path):
-        return hashlib.sha256(item.content).hexdigest()
-    return hashlib.sha256(item.read_bytes()).hexdigest() if item.is_file() else None
+        return digest(item.content)
+    return digest(item.read_bytes()) if item.is_file() else None
 
 
 def _tools() -> dict[str, dict[str, str]]:

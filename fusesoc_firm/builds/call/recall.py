@@ -80,7 +80,7 @@ def messages_fact(generated: str, core: str, run: str) -> facts.Fact:
 
 def hold(noted: Iterable[facts.Fact], run: str) -> bool:
     """Return whether all facts are in their recorded states."""
-    return all(state(kind, name, run) == was for kind, name, was in noted)
+    return facts.hold(noted, lambda kind, name: state(kind, name, run))
 
 
 def state(kind: str, name: str, run: str) -> str | None:

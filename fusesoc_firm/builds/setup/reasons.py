@@ -10,9 +10,10 @@ from typing import Any
 
 from fusesoc_firm.builds.step.action import Action
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import Fact, state
+from fusesoc_firm.builds.step.observed import state
 from fusesoc_firm.builds.step.results import Results
 from fusesoc_firm.tools.digests import digest_of
+from fusesoc_firm.tools.facts import Fact
 
 _NEW = "it has not run in this folder before"
 _OTHER = {

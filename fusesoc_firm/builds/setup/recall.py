@@ -22,13 +22,13 @@ from pathlib import Path
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.step import environment
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import StateOf, hold, states
+from fusesoc_firm.builds.step.observed import states
 from fusesoc_firm.builds.step.results import Results
 from fusesoc_firm.builds.step.tree import Item, Tree
 from fusesoc_firm.builds.store.packages import version
 from fusesoc_firm.tools import own_code
 from fusesoc_firm.tools.digests import digest_of
-from fusesoc_firm.tools.facts import Fact, state
+from fusesoc_firm.tools.facts import Fact, StateOf, hold, state
 from fusesoc_firm.tools.library_path import demos_root, library_root
 from fusesoc_firm.tools.own_code import PACKAGE
 from fusesoc_firm.tools.reads import Reads, noted
@@ -112,7 +112,7 @@ class Recall:
         """Return the builds of the same command in the same state of the libraries, and the digest of this state."""
         note = self.results.note(self._key("plan", ""))
         try:
-            if not isinstance(note, dict) or not self._hold(note["facts"]):
+            if not isinstance(note, dict) or not hold(note["facts"], self._state):
                 return None
             return [Build(core, target, Path(root)) for core, target, root in note["builds"]], digest_of(note["facts"])
         except (LookupError, TypeError, ValueError):
@@ -131,7 +131,7 @@ class Recall:
         """Return a build's flow or tool, and the content of its folder after the setup, if the setup is unchanged."""
         note = self.results.note(self._key(str(build), scan))
         try:
-            if not isinstance(note, dict) or not self._hold(note["facts"]):
+            if not isinstance(note, dict) or not hold(note["facts"], self._state):
                 return None
             api, name = note["backend"]
             return (api, name), {path: Item(*item) for path, item in note["tree"].items()}
@@ -149,9 +149,6 @@ class Recall:
     def _key(self, name: str, scan: str) -> str:
         # A build's setup depends on fewer words, but a command is usually repeated as a whole.
         return digest_of([name, scan, str(self.build_root), str(Path.cwd()), self.words, _session()])
-
-    def _hold(self, listed: Iterable[Sequence[str | None]]) -> bool:
-        return hold(((str(kind), str(name), was) for kind, name, was in listed), self._state)
 
 
 @cache

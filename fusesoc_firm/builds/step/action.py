@@ -25,7 +25,7 @@ from typing import IO, Any
 
 from fusesoc_firm.builds.step import environment as variables
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import StateOf, facts_of, hold, states
+from fusesoc_firm.builds.step.observed import facts_of, states
 from fusesoc_firm.builds.step.places import Places, places_of
 from fusesoc_firm.builds.step.results import Record, Results
 from fusesoc_firm.builds.step.sandbox import sandboxed
@@ -33,6 +33,7 @@ from fusesoc_firm.builds.step.trace import Trace, can_trace, fix_addresses, trac
 from fusesoc_firm.builds.step.tree import FILE, PROGRAM, Item, Tree, changed, in_order_of_time, key_of, removed, tree_of
 from fusesoc_firm.builds.store.packages import version
 from fusesoc_firm.tools.digests import digest_of
+from fusesoc_firm.tools.facts import StateOf, hold
 
 TWICE = "FUSESOC_FIRM_ACTIONS_TWICE"
 """The environment variable with the number N, so that one in N actions runs twice; 0 for none."""

@@ -16,18 +16,13 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from importlib.machinery import all_suffixes
 
 from fusesoc_firm.builds.step.contents import Contents
 from fusesoc_firm.builds.step.trace import Trace
-
-Fact = tuple[str, str, str | None]
-"""The kind, the name and the state of a fact; the state of a missing object is None."""
-
-StateOf = Callable[[str, str], str | None]
-"""A function that returns the state of the fact with this kind and name."""
+from fusesoc_firm.tools.facts import Fact, StateOf
 
 # Python adds this folder beside each imported module.
 _BYTE_CODE = "__pycache__"
@@ -46,11 +41,6 @@ def facts_of(trace: Trace, contents: Contents, search: str) -> list[Fact]:
     known = {name for _, name in names}
     names |= {("there", path): None for path in sorted(trace.asked) if path not in known and _BYTE_CODE not in path}
     return [(kind, name, state(kind, name, contents, search)) for kind, name in names]
-
-
-def hold(facts: Iterable[Fact], state_of: StateOf) -> bool:
-    """Return whether no state differs."""
-    return all(state_of(kind, name) == was for kind, name, was in facts)
 
 
 def states(contents: Contents, search: str) -> StateOf:

@@ -24,13 +24,13 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.step.contents import Contents
-from fusesoc_firm.builds.step.observed import Fact
 from fusesoc_firm.builds.step.tree import FILE, FOLDER, LINK, PROGRAM, Item
 from fusesoc_firm.builds.store import layout, shared_files
 from fusesoc_firm.builds.store.layout import is_path
 from fusesoc_firm.builds.store.limited import LimitedFolder, limit_of
 from fusesoc_firm.builds.store.remote import Remote, remote_store
 from fusesoc_firm.tools.digests import default_root, digest, is_digest
+from fusesoc_firm.tools.facts import Fact
 
 FOLDER_NAME = "actions1"
 LIMIT = "FUSESOC_FIRM_ACTIONS_SIZE"
@@ -38,7 +38,7 @@ _AC, _CAS, _NOTES = f"{FOLDER_NAME}/ac", f"{FOLDER_NAME}/cas", f"{FOLDER_NAME}/n
 _DEFAULT_LIMIT = "10G"
 _MOST_BYTES = 2**31
 _MOST_RECORD_BYTES = 2**26
-_FACT_PARTS, _ITEM_PARTS = 3, 4
+_ITEM_PARTS = 4
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ def _checked(data: Mapping[str, Any]) -> Record | None:
     """Return the record in plain data, or None. May raise other errors for data of another form."""
     facts, outputs, removed, sizes = data["facts"], data["outputs"], data["removed"], data["sizes"]
     is_good = (
-        all(len(fact) == _FACT_PARTS and isinstance(fact[0], str) and isinstance(fact[1], str) for fact in facts)
+        layout.are_facts(facts)
         and all(_is_item(item) for item in outputs)
         and all(is_path(path) for path in removed)
         and {data["log"], *(item[2] for item in outputs if item[1] in (FILE, PROGRAM))} == sizes.keys()

@@ -95,7 +95,7 @@ def read_note(root: str, name: str) -> dict[str, Any] | None:
     note = _plain(read(root, name))
     if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
-    is_good = is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
+    is_good = is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and are_facts(note["facts"])
     return note if is_good else None
 
 
@@ -164,8 +164,8 @@ def _are_printable(values: list[object]) -> bool:
     return all(isinstance(value, str) and value.isprintable() for value in values)
 
 
-def _are_facts(facts: object) -> bool:
-    """Return whether each item has a kind, a name and a state."""
+def are_facts(facts: object) -> bool:
+    """Return whether a value is a list of facts, each with a kind, a name and a state."""
     return isinstance(facts, list) and all(
         isinstance(fact, list) and len(fact) == _FACT_PARTS and _are_texts(fact[:2]) for fact in facts
     )
