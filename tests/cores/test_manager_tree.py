@@ -67,6 +67,7 @@ def tree_library(directory: Path) -> Library:
             "sched/package",
             *policies,
             "sched/by_policy",
+            "manager/manager",
             "manager/tree",
             "sim/checker",
             "sim/host",

@@ -60,6 +60,7 @@ _TREE_CORES = (
     "sched/package",
     *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
     *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+    "manager/manager",
     "manager/tree",
 )
 

@@ -11,7 +11,7 @@ _SLICE = "firm_axis_register_slice.vhd"
 _DEMUX = "firm_axis_demux.vhd"
 _MUX = "firm_axis_mux.vhd"
 _BURST = "firm_axis_burst.vhd"
-_MANAGER = "firm_manager.vhd"
+_GROUP = "firm_manager_group.vhd"
 
 
 def _size(width: int, channels: int, *, is_preemptive: bool = False) -> Size:
@@ -38,10 +38,10 @@ def _loses_id(*violates: str) -> Mutation:
 _SLOT = (
     Mutation(_MUX, "<= decode(source, take, SOURCES)", "<= (others => take)", ("only_the_granted_one_is_taken",)),
     Mutation(
-        _MANAGER, "sched_request <= pub_axis_tvalid", "sched_request <= (others => '1')", ("scheduler_sees_requests",)
+        _GROUP, "sched_request <= pub_axis_tvalid", "sched_request <= (others => '1')", ("scheduler_sees_requests",)
     ),
-    Mutation(_MANAGER, "(granted_tvalid and granted_tready)", "granted_tvalid", ("scheduler_sees_beats",)),
-    Mutation(_MANAGER, "cut or granted_tlast", "'1'", ("scheduler_sees_last",)),
+    Mutation(_GROUP, "(granted_tvalid and granted_tready)", "granted_tvalid", ("scheduler_sees_beats",)),
+    Mutation(_GROUP, "cut or granted_tlast", "'1'", ("scheduler_sees_last",)),
 )
 
 _TO_SUBSCRIBERS = Proof(
@@ -91,8 +91,8 @@ _TO_HOST = Proof(
         _forgets_skid("in_order_unchanged"),
         _halves_rate("no_bubble"),
         _loses_id("tid_is_the_publisher"),
-        Mutation(_MANAGER, "sent_tuser     <= granted_tuser", 'sent_tuser     <= "1"', ("abort_ends_one_frame",)),
-        Mutation(_MANAGER, "sent_tuser     <= granted_tuser", 'sent_tuser     <= "0"', ("no_abort_lost",)),
+        Mutation(_GROUP, "<= granted_tuser", '<= "1"', ("abort_ends_one_frame",)),
+        Mutation(_GROUP, "<= granted_tuser", '<= "0"', ("no_abort_lost",)),
     ),
 )
 

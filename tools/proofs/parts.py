@@ -9,6 +9,7 @@ _QUEUE = "firm_axis_queue.vhd"
 _WATCHDOG = "firm_axis_watchdog.vhd"
 _SUBSCRIBER = "axis_to_std_msgs_string"
 _SINK_WATCHDOG = "firm_axis_sink_watchdog.vhd"
+_GROUP = "firm_manager_group.vhd"
 _TREE = "firm_manager_tree.vhd"
 _INSERT = "firm_axis_id_insert.vhd"
 
@@ -155,6 +156,7 @@ _TREE_CORES = (
     "sched/package",
     *(f"sched/{core}" for core in ("queue", "engine", "fixed_priority", "round_robin", "lru")),
     *(f"sched/{core}" for core in ("edf_resources", "edf_latency", "lst", "by_policy")),
+    "manager/manager",
     "manager/tree",
 )
 
@@ -204,7 +206,7 @@ _TREE_TO_HOST = Proof(
     is_bounded=True,
 )
 
-_REPORT = "pub_ready(FIRST+SIZE-1 downto FIRST);"
+_REPORT = "pub_ready;"
 _WATCHED_TREE = Proof(
     "tree_watchdog",
     "small_tree",
@@ -220,8 +222,8 @@ _WATCHED_TREE = Proof(
             _TREE, "tick     <= '1' when counted_r = PERIOD-1 else '0';", "tick     <= '1';", ("no_hasty_abort",), 1
         ),
         Mutation(_WATCHDOG, "inside_r = '1' and ready = '1'", "inside_r = '1'", ("no_hasty_abort",)),
-        Mutation(_TREE, _REPORT, f"not {_REPORT}", ("each_abort_is_reported",)),
-        Mutation(_TREE, f"<= {_REPORT}", "<= (others => '1');", ("no_report_invented",)),
+        Mutation(_GROUP, f"expired <= {_REPORT}", f"expired <= not {_REPORT}", ("each_abort_is_reported",)),
+        Mutation(_GROUP, f"expired <= {_REPORT}", "expired <= (others => '1');", ("no_report_invented",)),
     ),
     sources=("small_tree.vhd",),
     trace=12,
@@ -235,7 +237,7 @@ _WATCHED_TREE_LIMITS = Proof(
     sizes=({"PUBLISHERS": 3, "WATCHDOG": 2}, {"PUBLISHERS": 3, "WATCHDOG": 4}),
     depth=23,
     mutations=(
-        Mutation(_TREE, "ends     <= cut or member_tlast;", "ends     <= member_tlast;", ("frees_the_group",), 1),
+        Mutation(_GROUP, "sched_last    <= cut or granted", "sched_last    <= granted", ("frees_the_group",), 1),
         Mutation(_WATCHDOG, "cut_r    <= '1';", "cut_r    <= '0';", ("frees_the_channel",), 1),
     ),
     sources=("small_tree.vhd",),

@@ -80,22 +80,6 @@ architecture rtl of firm_manager is
   signal routed_tlast  : std_logic;
   signal routed_tready : std_logic;
 
-  signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
-  signal granted_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
-  signal granted_tuser  : std_logic_vector(0 downto 0);
-  signal granted_tvalid : std_logic;
-  signal granted_tlast  : std_logic;
-  signal granted_tready : std_logic;
-
-  signal sent_tdata  : std_logic_vector(WIDTH-1 downto 0);
-  signal sent_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
-  signal sent_tuser  : std_logic_vector(0 downto 0);
-  signal sent_tvalid : std_logic;
-  signal sent_tlast  : std_logic;
-  signal sent_tready : std_logic;
-
-  signal cut : std_logic;  -- the watchdog ends the granted publisher's frame
-
   signal out_tid : std_logic_vector(7 downto 0);
 
 begin
@@ -156,115 +140,36 @@ begin
       id_error      => id_error
     );
 
-  u_mux : entity firm.firm_axis_mux
+  u_group : entity firm.firm_manager_group
     generic map (
-      WIDTH   => WIDTH,
-      SOURCES => PUBLISHERS
+      WIDTH      => WIDTH,
+      PUBLISHERS => PUBLISHERS,
+      PREEMPTIVE => PREEMPTIVE,
+      WATCHDOG   => WATCHDOG
     )
     port map (
-      source        => sched_grant_select,
-      enable        => sched_grant_valid,
-      s_axis_tdata  => pub_axis_tdata,
-      s_axis_tkeep  => pub_axis_tkeep,
-      s_axis_tuser  => pub_axis_tuser,
-      s_axis_tvalid => pub_axis_tvalid,
-      s_axis_tlast  => pub_axis_tlast,
-      s_axis_tready => pub_axis_tready,
-      m_axis_tdata  => granted_tdata,
-      m_axis_tkeep  => granted_tkeep,
-      m_axis_tuser  => granted_tuser,
-      m_axis_tvalid => granted_tvalid,
-      m_axis_tlast  => granted_tlast,
-      m_axis_tready => granted_tready
-    );
-
-  whole_frames : if not PREEMPTIVE and WATCHDOG <= 0 generate
-    sent_tdata     <= granted_tdata;
-    sent_tkeep     <= granted_tkeep;
-    sent_tuser     <= granted_tuser;
-    sent_tvalid    <= granted_tvalid;
-    sent_tlast     <= granted_tlast;
-    granted_tready <= sent_tready;
-  end generate whole_frames;
-
-  watched_frames : if not PREEMPTIVE and WATCHDOG > 0 generate
-    u_watchdog : entity firm.firm_axis_watchdog
-      generic map (
-        WIDTH   => WIDTH,
-        SOURCES => PUBLISHERS,
-        LIMIT   => WATCHDOG
-      )
-      port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        source        => sched_grant_select,
-        s_axis_tdata  => granted_tdata,
-        s_axis_tkeep  => granted_tkeep,
-        s_axis_tuser  => granted_tuser,
-        s_axis_tvalid => granted_tvalid,
-        s_axis_tlast  => granted_tlast,
-        s_axis_tready => granted_tready,
-        m_axis_tdata  => sent_tdata,
-        m_axis_tkeep  => sent_tkeep,
-        m_axis_tuser  => sent_tuser,
-        m_axis_tvalid => sent_tvalid,
-        m_axis_tlast  => sent_tlast,
-        m_axis_tready => sent_tready,
-        cut           => cut,
-        expired       => expired
-      );
-  end generate watched_frames;
-
-  unwatched_frames : if PREEMPTIVE or WATCHDOG <= 0 generate
-    cut     <= '0';
-    expired <= (others => '0');
-  end generate unwatched_frames;
-
-  parts_of_frames : if PREEMPTIVE generate
-    u_burst : entity firm.firm_axis_burst
-      generic map (
-        WIDTH   => WIDTH,
-        SOURCES => PUBLISHERS
-      )
-      port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        source        => sched_grant_select,
-        s_axis_tdata  => granted_tdata,
-        s_axis_tkeep  => granted_tkeep,
-        s_axis_tuser  => granted_tuser,
-        s_axis_tvalid => granted_tvalid,
-        s_axis_tlast  => granted_tlast,
-        s_axis_tready => granted_tready,
-        m_axis_tdata  => sent_tdata,
-        m_axis_tkeep  => sent_tkeep,
-        m_axis_tuser  => sent_tuser,
-        m_axis_tvalid => sent_tvalid,
-        m_axis_tlast  => sent_tlast,
-        m_axis_tready => sent_tready
-      );
-  end generate parts_of_frames;
-
-  u_slice_out : entity firm.firm_axis_register_slice
-    generic map (
-      WIDTH => WIDTH
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      s_axis_tdata  => sent_tdata,
-      s_axis_tkeep  => sent_tkeep,
-      s_axis_tuser  => sent_tuser,
-      s_axis_tvalid => sent_tvalid,
-      s_axis_tlast  => sent_tlast,
-      s_axis_tready => sent_tready,
-      m_axis_tdata  => m_axis_tdata,
-      m_axis_tkeep  => m_axis_tkeep,
-      m_axis_tuser  => m_axis_tuser,
-      m_axis_tid    => out_tid,
-      m_axis_tvalid => m_axis_tvalid,
-      m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready
+      clk                => clk,
+      rst_n              => rst_n,
+      pub_axis_tdata     => pub_axis_tdata,
+      pub_axis_tkeep     => pub_axis_tkeep,
+      pub_axis_tuser     => pub_axis_tuser,
+      pub_axis_tvalid    => pub_axis_tvalid,
+      pub_axis_tlast     => pub_axis_tlast,
+      pub_axis_tready    => pub_axis_tready,
+      sched_request      => sched_request,
+      sched_beat         => sched_beat,
+      sched_last         => sched_last,
+      sched_grant_valid  => sched_grant_valid,
+      sched_grant_select => sched_grant_select,
+      m_axis_tdata       => m_axis_tdata,
+      m_axis_tkeep       => m_axis_tkeep,
+      m_axis_tuser       => m_axis_tuser,
+      m_axis_tid         => out_tid,
+      m_axis_high        => open,
+      m_axis_tvalid      => m_axis_tvalid,
+      m_axis_tlast       => m_axis_tlast,
+      m_axis_tready      => m_axis_tready,
+      expired            => expired
     );
 
   -- Ids of publishers have at most this number of bits.
@@ -276,9 +181,5 @@ begin
       m_axis_tid(place) <= '0';
     end generate above;
   end generate name_publisher;
-
-  sched_request <= pub_axis_tvalid;
-  sched_beat    <= cut or (granted_tvalid and granted_tready);
-  sched_last    <= cut or granted_tlast;
 
 end architecture rtl;

@@ -90,6 +90,14 @@ architecture rtl of firm_manager_tree is
     return policy = FIXED_PRIORITY or policy = ROUND_ROBIN or policy = LRU;
   end function sends_whole_frames;
 
+  function ticks_to_abort return natural is
+  begin
+    if WATCHDOG > 0 then
+      return TICKS;
+    end if;
+    return 0;
+  end function ticks_to_abort;
+
   function high_of(place : natural) return natural is
   begin
     if HIGHS'length = PUBLISHERS then
@@ -155,8 +163,6 @@ architecture rtl of firm_manager_tree is
   signal high          : std_logic_vector(7 downto 0);
   signal has_high      : std_logic;
 
-  signal pub_ready : std_logic_vector(PUBLISHERS-1 downto 0);
-
   -- The timer of the watchdogs, and the clearing of their memories after reset.
   signal tick     : std_logic;
   signal clearing : std_logic;
@@ -197,8 +203,6 @@ begin
   assert FAULT = ""
     report "firm_manager_tree: " & FAULT
     severity failure;
-
-  pub_axis_tready <= pub_ready;
 
   u_slice_in : entity firm.firm_axis_register_slice
     generic map (
@@ -326,25 +330,13 @@ begin
         return result;
       end function highs_of_group;
 
-      signal grant_valid    : std_logic;
-      signal grant_select   : std_logic_vector(index_bits(SIZE)-1 downto 0);
-      signal beat           : std_logic;
-      signal cut            : std_logic;  -- the watchdog ends the granted publisher's frame
-      signal ends           : std_logic;
-      signal highs_in       : std_logic_vector(SIZE*8-1 downto 0);
-      signal member_tdata   : std_logic_vector(WIDTH-1 downto 0);
-      signal member_tkeep   : std_logic_vector(LANES-1 downto 0);
-      signal member_tuser   : std_logic_vector(0 downto 0);
-      signal member_tvalid  : std_logic;
-      signal member_tlast   : std_logic;
-      signal member_tready  : std_logic;
-      signal chosen_tdata   : std_logic_vector(WIDTH-1 downto 0);
-      signal chosen_tkeep   : std_logic_vector(LANES-1 downto 0);
-      signal chosen_tuser   : std_logic_vector(8 downto 0);
-      signal chosen_tvalid  : std_logic;
-      signal chosen_tlast   : std_logic;
-      signal chosen_tready  : std_logic;
-      signal group_user     : std_logic_vector(8 downto 0);
+      signal request      : std_logic_vector(SIZE-1 downto 0);
+      signal grant_valid  : std_logic;
+      signal grant_select : std_logic_vector(index_bits(SIZE)-1 downto 0);
+      signal beat         : std_logic;
+      signal last         : std_logic;
+      signal group_highs  : std_logic_vector(SIZE*8-1 downto 0);
+      signal member_high  : std_logic_vector(7 downto 0);
     begin
       u_scheduler : entity firm.firm_sched_by_policy
         generic map (
@@ -354,96 +346,14 @@ begin
         port map (
           clk          => clk,
           rst_n        => rst_n,
-          request      => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
+          request      => request,
           beat         => beat,
-          last         => ends,
+          last         => last,
           grant_valid  => grant_valid,
           grant_select => grant_select
         );
 
-      u_group_mux : entity firm.firm_axis_mux
-        generic map (
-          WIDTH   => WIDTH,
-          SOURCES => SIZE
-        )
-        port map (
-          source        => grant_select,
-          enable        => grant_valid,
-          s_axis_tdata  => pub_axis_tdata((FIRST+SIZE)*WIDTH-1 downto FIRST*WIDTH),
-          s_axis_tkeep  => pub_axis_tkeep((FIRST+SIZE)*LANES-1 downto FIRST*LANES),
-          s_axis_tuser  => pub_axis_tuser(FIRST+SIZE-1 downto FIRST),
-          s_axis_tvalid => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
-          s_axis_tlast  => pub_axis_tlast(FIRST+SIZE-1 downto FIRST),
-          s_axis_tready => pub_ready(FIRST+SIZE-1 downto FIRST),
-          m_axis_tdata  => member_tdata,
-          m_axis_tkeep  => member_tkeep,
-          m_axis_tuser  => member_tuser,
-          m_axis_tvalid => member_tvalid,
-          m_axis_tlast  => member_tlast,
-          m_axis_tready => member_tready
-        );
-
-      unwatched : if WATCHDOG <= 0 generate
-        chosen_tdata             <= member_tdata;
-        chosen_tkeep             <= member_tkeep;
-        chosen_tuser(0 downto 0) <= member_tuser;
-        chosen_tvalid            <= member_tvalid;
-        chosen_tlast             <= member_tlast;
-        member_tready           <= chosen_tready;
-        cut                      <= '0';
-
-        expired(FIRST+SIZE-1 downto FIRST) <= (others => '0');
-      end generate unwatched;
-
-      watched : if WATCHDOG > 0 generate
-        signal expires : std_logic;
-      begin
-        -- The granted publisher is the only one that is ready then.
-        report_publishers : process (clk)
-        begin
-          if rising_edge(clk) then
-            expired(FIRST+SIZE-1 downto FIRST) <= pub_ready(FIRST+SIZE-1 downto FIRST);
-            if rst_n = '0' or expires = '0' then
-              expired(FIRST+SIZE-1 downto FIRST) <= (others => '0');
-            end if;
-          end if;
-        end process report_publishers;
-
-        u_watchdog : entity firm.firm_axis_watchdog
-          generic map (
-            WIDTH           => WIDTH,
-            SOURCES         => SIZE,
-            LIMIT           => TICKS,
-            SHARED_CLEARING => true
-          )
-          port map (
-            clk           => clk,
-            rst_n         => rst_n,
-            tick          => tick,
-            clearing      => clearing,
-            cleared       => cleared(index_bits(SIZE)-1 downto 0),
-            source        => grant_select,
-            s_axis_tdata  => member_tdata,
-            s_axis_tkeep  => member_tkeep,
-            s_axis_tuser  => member_tuser,
-            s_axis_tvalid => member_tvalid,
-            s_axis_tlast  => member_tlast,
-            s_axis_tready => member_tready,
-            m_axis_tdata  => chosen_tdata,
-            m_axis_tkeep  => chosen_tkeep,
-            m_axis_tuser  => chosen_tuser(0 downto 0),
-            m_axis_tvalid => chosen_tvalid,
-            m_axis_tlast  => chosen_tlast,
-            m_axis_tready => chosen_tready,
-            cut           => cut,
-            expires       => expires,
-            expired       => open
-          );
-      end generate watched;
-
-      highs_in <= highs_of_group;
-      beat     <= cut or (member_tvalid and member_tready);
-      ends     <= cut or member_tlast;
+      group_highs <= highs_of_group;
 
       u_group_high : entity firm.firm_axis_select
         generic map (
@@ -451,36 +361,46 @@ begin
           WIDTH => 8
         )
         port map (
-          words_in => highs_in,
+          words_in => group_highs,
           index    => grant_select,
-          word     => chosen_tuser(8 downto 1)
+          word     => member_high
         );
 
-      u_slice : entity firm.firm_axis_register_slice
+      u_group : entity firm.firm_manager_group
         generic map (
-          WIDTH     => WIDTH,
-          USER_BITS => 9
+          WIDTH           => WIDTH,
+          PUBLISHERS      => SIZE,
+          WATCHDOG        => ticks_to_abort,
+          SHARED_CLEARING => true
         )
         port map (
-          clk           => clk,
-          rst_n         => rst_n,
-          s_axis_tdata  => chosen_tdata,
-          s_axis_tkeep  => chosen_tkeep,
-          s_axis_tuser  => chosen_tuser,
-          s_axis_tvalid => chosen_tvalid,
-          s_axis_tlast  => chosen_tlast,
-          s_axis_tready => chosen_tready,
-          m_axis_tdata  => group_tdata((group_index+1)*WIDTH-1 downto group_index*WIDTH),
-          m_axis_tkeep  => group_tkeep((group_index+1)*LANES-1 downto group_index*LANES),
-          m_axis_tuser  => group_user,
-          m_axis_tid    => open,
-          m_axis_tvalid => group_tvalid(group_index),
-          m_axis_tlast  => group_tlast(group_index),
-          m_axis_tready => group_tready(group_index)
+          clk                => clk,
+          rst_n              => rst_n,
+          tick               => tick,
+          clearing           => clearing,
+          cleared            => cleared(index_bits(SIZE)-1 downto 0),
+          pub_axis_tdata     => pub_axis_tdata((FIRST+SIZE)*WIDTH-1 downto FIRST*WIDTH),
+          pub_axis_tkeep     => pub_axis_tkeep((FIRST+SIZE)*LANES-1 downto FIRST*LANES),
+          pub_axis_tuser     => pub_axis_tuser(FIRST+SIZE-1 downto FIRST),
+          pub_axis_tvalid    => pub_axis_tvalid(FIRST+SIZE-1 downto FIRST),
+          pub_axis_tlast     => pub_axis_tlast(FIRST+SIZE-1 downto FIRST),
+          pub_axis_tready    => pub_axis_tready(FIRST+SIZE-1 downto FIRST),
+          sched_request      => request,
+          sched_beat         => beat,
+          sched_last         => last,
+          sched_grant_valid  => grant_valid,
+          sched_grant_select => grant_select,
+          high               => member_high,
+          m_axis_tdata       => group_tdata((group_index+1)*WIDTH-1 downto group_index*WIDTH),
+          m_axis_tkeep       => group_tkeep((group_index+1)*LANES-1 downto group_index*LANES),
+          m_axis_tuser       => group_tuser(group_index downto group_index),
+          m_axis_tid         => open,
+          m_axis_high        => group_high((group_index+1)*8-1 downto group_index*8),
+          m_axis_tvalid      => group_tvalid(group_index),
+          m_axis_tlast       => group_tlast(group_index),
+          m_axis_tready      => group_tready(group_index),
+          expired            => expired(FIRST+SIZE-1 downto FIRST)
         );
-
-      group_tuser(group_index)                               <= group_user(0);
-      group_high((group_index+1)*8-1 downto group_index*8) <= group_user(8 downto 1);
     end generate legal;
   end generate each_group;
 

@@ -109,60 +109,60 @@ end
 
 // What the registers mean, for induction: the slice holds up to two beats, the older one in its output; behind them may come
 // what resumes a frame, and then the beat that is held.
-(* hierconn *) wire                  \dut.u_slice_out.valid_r ;
-(* hierconn *) wire                  \dut.u_slice_out.ready_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.output_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.skid_r ;
-(* hierconn *) wire [7:0]            \dut.u_slice_out.id_r ;
+(* hierconn *) wire                  \dut.u_group.u_slice_out.valid_r ;
+(* hierconn *) wire                  \dut.u_group.u_slice_out.ready_r ;
+(* hierconn *) wire [SENT_BITS-1:0]  \dut.u_group.u_slice_out.output_r ;
+(* hierconn *) wire [SENT_BITS-1:0]  \dut.u_group.u_slice_out.skid_r ;
+(* hierconn *) wire [7:0]            \dut.u_group.u_slice_out.id_r ;
 
-wire                    has_older = \dut.u_slice_out.valid_r ;
-wire                    has_newer = has_older && !\dut.u_slice_out.ready_r ;
-wire [PAYLOAD_BITS-1:0] older     = payload_of(\dut.u_slice_out.output_r );
-wire [PAYLOAD_BITS-1:0] newer     = payload_of(\dut.u_slice_out.skid_r );
-wire [7:0]              older_id  = \dut.u_slice_out.id_r ;
+wire                    has_older = \dut.u_group.u_slice_out.valid_r ;
+wire                    has_newer = has_older && !\dut.u_group.u_slice_out.ready_r ;
+wire [PAYLOAD_BITS-1:0] older     = sent_of(\dut.u_group.u_slice_out.output_r );
+wire [PAYLOAD_BITS-1:0] newer     = sent_of(\dut.u_group.u_slice_out.skid_r );
+wire [7:0]              older_id  = \dut.u_group.u_slice_out.id_r ;
 wire [7:0]              newer_id  = older[PAYLOAD_BITS-1] ? newer[7:0] : older_id;
 wire [7:0]              newest_id = has_newer ? newer_id : older_id;
 wire                    is_over   = has_newer ? newer[PAYLOAD_BITS-1] : older[PAYLOAD_BITS-1];
 wire [1:0]              in_slice  = has_older + has_newer;
 
 localparam INDEX_BITS = $clog2(`PUBLISHERS);
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_r ;
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.resume_r ;
-(* hierconn *) wire [`WIDTH-1:0]     \dut.parts_of_frames_u_burst.held_tdata_r ;
-(* hierconn *) wire [`WIDTH/8-1:0]   \dut.parts_of_frames_u_burst.held_tkeep_r ;
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tuser_r ;
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.held_tlast_r ;
-(* hierconn *) wire [INDEX_BITS-1:0] \dut.parts_of_frames_u_burst.held_source_r ;
-(* hierconn *) wire [INDEX_BITS:0]   \dut.parts_of_frames_u_burst.cleared_r ;
+(* hierconn *) wire                  \dut.u_group.parts_of_frames_u_burst.held_r ;
+(* hierconn *) wire                  \dut.u_group.parts_of_frames_u_burst.resume_r ;
+(* hierconn *) wire [`WIDTH-1:0]     \dut.u_group.parts_of_frames_u_burst.held_tdata_r ;
+(* hierconn *) wire [`WIDTH/8-1:0]   \dut.u_group.parts_of_frames_u_burst.held_tkeep_r ;
+(* hierconn *) wire                  \dut.u_group.parts_of_frames_u_burst.held_tuser_r ;
+(* hierconn *) wire                  \dut.u_group.parts_of_frames_u_burst.held_tlast_r ;
+(* hierconn *) wire [INDEX_BITS-1:0] \dut.u_group.parts_of_frames_u_burst.held_source_r ;
+(* hierconn *) wire [INDEX_BITS:0]   \dut.u_group.parts_of_frames_u_burst.cleared_r ;
 
-wire                    is_held     = \dut.parts_of_frames_u_burst.held_r ;
-wire                    is_resumed  = \dut.parts_of_frames_u_burst.resume_r ;
-wire [7:0]              held_source = \dut.parts_of_frames_u_burst.held_source_r ;
+wire                    is_held     = \dut.u_group.parts_of_frames_u_burst.held_r ;
+wire                    is_resumed  = \dut.u_group.parts_of_frames_u_burst.resume_r ;
+wire [7:0]              held_source = \dut.u_group.parts_of_frames_u_burst.held_source_r ;
 wire [PAYLOAD_BITS-1:0] held = {
-    \dut.parts_of_frames_u_burst.held_tlast_r ,
-    \dut.parts_of_frames_u_burst.held_tuser_r ,
-    \dut.parts_of_frames_u_burst.held_tkeep_r ,
-    \dut.parts_of_frames_u_burst.held_tdata_r };
+    \dut.u_group.parts_of_frames_u_burst.held_tlast_r ,
+    \dut.u_group.parts_of_frames_u_burst.held_tuser_r ,
+    \dut.u_group.parts_of_frames_u_burst.held_tkeep_r ,
+    \dut.u_group.parts_of_frames_u_burst.held_tdata_r };
 
 reg held_begins;
 always @(posedge clk) if (take) held_begins <= begins;
 
 // The memory of frames that have begun, as far as it is cleared.
 wire [`PUBLISHERS-1:0] memory;
-(* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[0] ;
-(* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[1] ;
-assign memory[0] = \dut.parts_of_frames_u_burst.is_begun[0] ;
-assign memory[1] = \dut.parts_of_frames_u_burst.is_begun[1] ;
+(* hierconn *) wire \dut.u_group.parts_of_frames_u_burst.is_begun[0] ;
+(* hierconn *) wire \dut.u_group.parts_of_frames_u_burst.is_begun[1] ;
+assign memory[0] = \dut.u_group.parts_of_frames_u_burst.is_begun[0] ;
+assign memory[1] = \dut.u_group.parts_of_frames_u_burst.is_begun[1] ;
 `ifdef PUBLISHERS_4
-(* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[2] ;
-(* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[3] ;
-assign memory[2] = \dut.parts_of_frames_u_burst.is_begun[2] ;
-assign memory[3] = \dut.parts_of_frames_u_burst.is_begun[3] ;
+(* hierconn *) wire \dut.u_group.parts_of_frames_u_burst.is_begun[2] ;
+(* hierconn *) wire \dut.u_group.parts_of_frames_u_burst.is_begun[3] ;
+assign memory[2] = \dut.u_group.parts_of_frames_u_burst.is_begun[2] ;
+assign memory[3] = \dut.u_group.parts_of_frames_u_burst.is_begun[3] ;
 `endif
 
-wire is_clearing = \dut.parts_of_frames_u_burst.cleared_r [INDEX_BITS];
+wire is_clearing = \dut.u_group.parts_of_frames_u_burst.cleared_r [INDEX_BITS];
 wire [`PUBLISHERS-1:0] uncleared =
-    is_clearing ? {`PUBLISHERS{1'b1}} << \dut.parts_of_frames_u_burst.cleared_r [INDEX_BITS-1:0] : 0;
+    is_clearing ? {`PUBLISHERS{1'b1}} << \dut.u_group.parts_of_frames_u_burst.cleared_r [INDEX_BITS-1:0] : 0;
 
 wire is_marked_held  = marked && ahead == in_slice + is_resumed;
 wire is_marked_newer = marked && has_newer && ahead == 1;

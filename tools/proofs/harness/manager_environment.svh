@@ -127,3 +127,9 @@ localparam SLICE_BITS = PAYLOAD_BITS;
 function [PAYLOAD_BITS-1:0] payload_of(input [SLICE_BITS-1:0] kept);
     payload_of = kept;
 endfunction
+
+// The register slice to the host has the upper byte of an id beside `tuser`, which is used in a tree only.
+localparam SENT_BITS = SLICE_BITS + 8;
+function [PAYLOAD_BITS-1:0] sent_of(input [SENT_BITS-1:0] kept);
+    sent_of = {kept[SENT_BITS-1], kept[PAYLOAD_BITS-2:0]};
+endfunction

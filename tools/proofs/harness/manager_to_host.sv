@@ -60,17 +60,17 @@ always @* if (running) begin
 end
 
 // What the registers mean, for induction.
-(* hierconn *) wire                  \dut.u_slice_out.valid_r ;
-(* hierconn *) wire                  \dut.u_slice_out.ready_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.output_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.skid_r ;
-(* hierconn *) wire [7:0]            \dut.u_slice_out.id_r ;
+(* hierconn *) wire                  \dut.u_group.u_slice_out.valid_r ;
+(* hierconn *) wire                  \dut.u_group.u_slice_out.ready_r ;
+(* hierconn *) wire [SENT_BITS-1:0]  \dut.u_group.u_slice_out.output_r ;
+(* hierconn *) wire [SENT_BITS-1:0]  \dut.u_group.u_slice_out.skid_r ;
+(* hierconn *) wire [7:0]            \dut.u_group.u_slice_out.id_r ;
 
-wire                    has_older = \dut.u_slice_out.valid_r ;
-wire                    has_newer = has_older && !\dut.u_slice_out.ready_r ;
-wire [PAYLOAD_BITS-1:0] older     = payload_of(\dut.u_slice_out.output_r );
-wire [PAYLOAD_BITS-1:0] newer     = payload_of(\dut.u_slice_out.skid_r );
-wire [7:0]              older_id  = \dut.u_slice_out.id_r ;
+wire                    has_older = \dut.u_group.u_slice_out.valid_r ;
+wire                    has_newer = has_older && !\dut.u_group.u_slice_out.ready_r ;
+wire [PAYLOAD_BITS-1:0] older     = sent_of(\dut.u_group.u_slice_out.output_r );
+wire [PAYLOAD_BITS-1:0] newer     = sent_of(\dut.u_group.u_slice_out.skid_r );
+wire [7:0]              older_id  = \dut.u_group.u_slice_out.id_r ;
 wire [7:0]              newer_id  = older[PAYLOAD_BITS-1] ? newer[7:0] : older_id;
 wire [7:0]              newest_id = has_newer ? newer_id : older_id;
 wire                    is_over   = has_newer ? newer[PAYLOAD_BITS-1] : older[PAYLOAD_BITS-1];
