@@ -4,10 +4,7 @@
 --
 -- Frames are counted in the cycle of their last beat, at any rate. Faults wait in one place for each channel until they
 -- are counted, one in a cycle; a fault whose channel's place is occupied is not counted, and `lost` pulses.
---
--- With TIME_STAMPS, a counter runs freely. Each channel has the value of this counter one cycle after an event: the
--- first beat of a subscriber's newest frame, or the last beat of a publisher's newest frame. The difference of both is
--- the time that a message took, in cycles modulo 2**32.
+-- firm_status_tables tells about TIME_STAMPS.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -63,16 +60,13 @@ end entity firm_status_counters;
 
 architecture rtl of firm_status_counters is
 
-  constant CHANNELS       : positive := SUBSCRIBERS + PUBLISHERS;
-  constant SUB_BITS       : positive := index_bits(SUBSCRIBERS);
-  constant PUB_BITS       : positive := index_bits(PUBLISHERS);
-  constant CHANNEL_BITS   : positive := index_bits(CHANNELS);
-  constant LONGEST        : unsigned(WAIT_BITS-1 downto 0) := (others => '1');
-  constant NO_CHANNEL     : std_logic_vector(CHANNELS-1 downto 0) := (others => '0');
-  constant NO_SUBSCRIBER  : std_logic_vector(SUBSCRIBERS-1 downto 0) := (others => '0');
-  constant FRAMES         : std_logic_vector(3 downto 0) := "1101";
-  constant WAITED         : std_logic_vector(3 downto 0) := "1110";
-  constant STAMPED        : std_logic_vector(3 downto 0) := "1111";
+  constant CHANNELS      : positive := SUBSCRIBERS + PUBLISHERS;
+  constant SUB_BITS      : positive := index_bits(SUBSCRIBERS);
+  constant PUB_BITS      : positive := index_bits(PUBLISHERS);
+  constant CHANNEL_BITS  : positive := index_bits(CHANNELS);
+  constant LONGEST       : unsigned(WAIT_BITS-1 downto 0) := (others => '1');
+  constant NO_CHANNEL    : std_logic_vector(CHANNELS-1 downto 0) := (others => '0');
+  constant NO_SUBSCRIBER : std_logic_vector(SUBSCRIBERS-1 downto 0) := (others => '0');
 
   -- The index of the bit that is '1'; zeros if there is none.
   function position(bits : std_logic_vector; size : positive) return std_logic_vector is
@@ -90,49 +84,32 @@ architecture rtl of firm_status_counters is
   end function position;
 
   -- Beats to subscribers.
-  signal sub_taken     : std_logic_vector(SUBSCRIBERS-1 downto 0);
-  signal sub_taken_r   : std_logic_vector(SUBSCRIBERS-1 downto 0) := (others => '0');
-  signal sub_last_r    : std_logic;
-  signal sub_wait_r    : unsigned(WAIT_BITS-1 downto 0);
-  signal sub_waited_r  : unsigned(WAIT_BITS-1 downto 0);
-  signal sub_valid     : std_logic;
-  signal sub_index     : std_logic_vector(SUB_BITS-1 downto 0);
-  signal sub_read      : std_logic_vector(SUB_BITS-1 downto 0);
-  signal sub_frames    : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal sub_longest   : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal sub_clear     : std_logic;
-  signal sub_stamp     : std_logic_vector(31 downto 0);
+  signal sub_taken   : std_logic_vector(SUBSCRIBERS-1 downto 0);
+  signal sub_taken_r : std_logic_vector(SUBSCRIBERS-1 downto 0) := (others => '0');
+  signal sub_offered : std_logic;
+  signal sub_beat    : std_logic;
+  signal sub_valid   : std_logic;
+  signal sub_index   : std_logic_vector(SUB_BITS-1 downto 0);
 
   -- Beats of publishers.
-  signal pub_wait_r    : std_logic_vector(PUBLISHERS*WAIT_BITS-1 downto 0);
-  signal pub_wait      : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal pub_beat_r    : std_logic;
-  signal pub_last_r    : std_logic;
-  signal pub_index_r   : std_logic_vector(PUB_BITS-1 downto 0) := (others => '0');
-  signal pub_waited_r  : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal pub_read      : std_logic_vector(PUB_BITS-1 downto 0);
-  signal pub_frames    : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal pub_longest   : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal pub_clear     : std_logic;
-  signal pub_stamp     : std_logic_vector(31 downto 0);
+  signal pub_wait_r   : std_logic_vector(PUBLISHERS*WAIT_BITS-1 downto 0);
+  signal pub_wait     : std_logic_vector(WAIT_BITS-1 downto 0);
+  signal pub_beat_r   : std_logic;
+  signal pub_last_r   : std_logic;
+  signal pub_index_r  : std_logic_vector(PUB_BITS-1 downto 0) := (others => '0');
+  signal pub_waited_r : std_logic_vector(WAIT_BITS-1 downto 0);
 
   -- Faults.
-  signal waiting_r     : std_logic_vector(CHANNELS-1 downto 0);
-  signal codes_r       : std_logic_vector(4*CHANNELS-1 downto 0);
-  signal lowest        : std_logic_vector(CHANNELS-1 downto 0);
-  signal chosen_r      : std_logic_vector(CHANNELS-1 downto 0);
-  signal counted_r     : std_logic;
-  signal channel_r     : std_logic_vector(CHANNEL_BITS-1 downto 0) := (others => '0');
-  signal code_r        : std_logic_vector(3 downto 0) := (others => '0');
-  signal fault_index   : std_logic_vector(CHANNEL_BITS+3 downto 0);
-  signal fault_read    : std_logic_vector(CHANNEL_BITS+3 downto 0);
-  signal faults        : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal fault_clear   : std_logic;
+  signal waiting_r   : std_logic_vector(CHANNELS-1 downto 0);
+  signal codes_r     : std_logic_vector(4*CHANNELS-1 downto 0);
+  signal lowest      : std_logic_vector(CHANNELS-1 downto 0);
+  signal chosen_r    : std_logic_vector(CHANNELS-1 downto 0);
+  signal counted_r   : std_logic;
+  signal channel_r   : std_logic_vector(CHANNEL_BITS-1 downto 0) := (others => '0');
+  signal code_r      : std_logic_vector(3 downto 0) := (others => '0');
+  signal fault_clear : std_logic;
 
-  signal channel       : unsigned(8 downto 0);
-  signal word_r        : std_logic_vector(3 downto 0);
-  signal is_sub_r      : std_logic;
-  signal is_known_r    : std_logic;
+  signal table_address : std_logic_vector(15 downto 0);
 
 begin
 
@@ -142,27 +119,15 @@ begin
   assert PUBLISHERS >= 1 and PUBLISHERS <= 256
     report "firm_status_counters: PUBLISHERS is " & integer'image(PUBLISHERS) & "; legal: 1 to 256"
     severity failure;
-  assert COUNT_BITS >= 1 and COUNT_BITS <= 32
-    report "firm_status_counters: COUNT_BITS is " & integer'image(COUNT_BITS) & "; legal: 1 to 32"
-    severity failure;
-  assert WAIT_BITS >= 1 and WAIT_BITS <= 32
-    report "firm_status_counters: WAIT_BITS is " & integer'image(WAIT_BITS) & "; legal: 1 to 32"
-    severity failure;
 
-  -- From the host. At most one subscriber is addressed, so one counter measures all waits.
-  sub_taken <= sub_axis_tvalid and sub_axis_tready;
+  sub_taken   <= sub_axis_tvalid and sub_axis_tready;
+  sub_offered <= '0' when sub_axis_tvalid = NO_SUBSCRIBER else '1';
+  sub_beat    <= '0' when sub_taken = NO_SUBSCRIBER else '1';
 
   watch_subscribers : process (clk)
   begin
     if rising_edge(clk) then
-      sub_taken_r  <= sub_taken;
-      sub_last_r   <= sub_axis_tlast;
-      sub_waited_r <= sub_wait_r;
-      if rst_n = '0' or sub_taken /= NO_SUBSCRIBER then
-        sub_wait_r <= (others => '0');
-      elsif sub_axis_tvalid /= NO_SUBSCRIBER and sub_wait_r /= LONGEST then
-        sub_wait_r <= sub_wait_r + 1;
-      end if;
+      sub_taken_r <= sub_taken;
       if rst_n = '0' or enable = '0' then
         sub_taken_r <= (others => '0');
       end if;
@@ -171,25 +136,6 @@ begin
 
   sub_valid <= '0' when sub_taken_r = NO_SUBSCRIBER else '1';
   sub_index <= position(sub_taken_r, SUB_BITS);
-
-  u_subscribers : entity firm.firm_status_tally
-    generic map (
-      INDEX_BITS   => SUB_BITS,
-      COUNT_BITS   => COUNT_BITS,
-      LONGEST_BITS => WAIT_BITS
-    )
-    port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => sub_clear,
-      op_valid     => sub_valid,
-      op_index     => sub_index,
-      op_count     => sub_last_r,
-      op_longest   => std_logic_vector(sub_waited_r),
-      read_index   => sub_read,
-      read_count   => sub_frames,
-      read_longest => sub_longest
-    );
 
   -- To the host. All publishers may wait at once.
   measure_waits : for number in 0 to PUBLISHERS-1 generate
@@ -231,87 +177,6 @@ begin
       end if;
     end if;
   end process watch_publishers;
-
-  u_publishers : entity firm.firm_status_tally
-    generic map (
-      INDEX_BITS   => PUB_BITS,
-      COUNT_BITS   => COUNT_BITS,
-      LONGEST_BITS => WAIT_BITS
-    )
-    port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => pub_clear,
-      op_valid     => pub_beat_r,
-      op_index     => pub_index_r,
-      op_count     => pub_last_r,
-      op_longest   => pub_waited_r,
-      read_index   => pub_read,
-      read_count   => pub_frames,
-      read_longest => pub_longest
-    );
-
-  -- Time stamps
-  without_stamps : if not TIME_STAMPS generate
-    cycles    <= (others => '0');
-    sub_stamp <= (others => '0');
-    pub_stamp <= (others => '0');
-  end generate without_stamps;
-
-  with_stamps : if TIME_STAMPS generate
-    signal cycles_r     : unsigned(31 downto 0);
-    signal is_first_r   : std_logic;  -- the next beat to a subscriber is the first one of its frame
-    signal was_first_r  : std_logic;
-    signal stamps_first : std_logic;
-    signal stamps_last  : std_logic;
-  begin
-
-    count_cycles : process (clk)
-    begin
-      if rising_edge(clk) then
-        cycles_r    <= cycles_r + 1;
-        was_first_r <= is_first_r;
-        if sub_taken /= NO_SUBSCRIBER then
-          is_first_r <= sub_axis_tlast;
-        end if;
-        if rst_n = '0' then
-          cycles_r   <= (others => '0');
-          is_first_r <= '1';
-        end if;
-      end if;
-    end process count_cycles;
-
-    cycles       <= std_logic_vector(cycles_r);
-    stamps_first <= sub_valid and was_first_r;
-    stamps_last  <= pub_beat_r and pub_last_r;
-
-    u_first_beats : entity firm.firm_status_stamps
-      generic map (
-        INDEX_BITS => SUB_BITS
-      )
-      port map (
-        clk        => clk,
-        op_valid   => stamps_first,
-        op_index   => sub_index,
-        op_stamp   => std_logic_vector(cycles_r),
-        read_index => sub_read,
-        read_stamp => sub_stamp
-      );
-
-    u_last_beats : entity firm.firm_status_stamps
-      generic map (
-        INDEX_BITS => PUB_BITS
-      )
-      port map (
-        clk        => clk,
-        op_valid   => stamps_last,
-        op_index   => pub_index_r,
-        op_stamp   => std_logic_vector(cycles_r),
-        read_index => pub_read,
-        read_stamp => pub_stamp
-      );
-
-  end generate with_stamps;
 
   -- Faults. The lowest waiting channel is next; its code is read in the cycle after the choice.
   lowest <= waiting_r and std_logic_vector(unsigned(not waiting_r) + 1);
@@ -357,70 +222,42 @@ begin
     end if;
   end process take_faults;
 
-  fault_index <= channel_r & code_r;
+  table_address <= "000" & read_address;
 
-  u_faults : entity firm.firm_status_tally
+  u_tables : entity firm.firm_status_tables
     generic map (
-      INDEX_BITS   => CHANNEL_BITS + 4,
-      COUNT_BITS   => COUNT_BITS,
-      LONGEST_BITS => 1
+      SUBSCRIBERS => SUBSCRIBERS,
+      PUBLISHERS  => PUBLISHERS,
+      COUNT_BITS  => COUNT_BITS,
+      FAULT_BITS  => COUNT_BITS,
+      WAIT_BITS   => WAIT_BITS,
+      TIME_STAMPS => TIME_STAMPS
     )
     port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => fault_clear,
-      op_valid     => counted_r,
-      op_index     => fault_index,
-      op_count     => '1',
-      op_longest   => "0",
-      read_index   => fault_read,
-      read_count   => faults,
-      read_longest => open
+      clk           => clk,
+      rst_n         => rst_n,
+      is_clear      => is_clear,
+      fault_clear   => fault_clear,
+      sub_offered   => sub_offered,
+      sub_beat      => sub_beat,
+      sub_last      => sub_axis_tlast,
+      sub_valid     => sub_valid,
+      sub_index     => sub_index,
+      pub_valid     => pub_beat_r,
+      pub_index     => pub_index_r,
+      pub_last      => pub_last_r,
+      pub_waited    => pub_waited_r,
+      waits_index   => open,
+      fault         => counted_r,
+      fault_channel => channel_r,
+      fault_code    => code_r,
+      cycles        => cycles,
+      read_address  => table_address,
+      read_word     => read_word
     );
 
   fault         <= counted_r;
   fault_channel <= std_logic_vector(resize(unsigned(channel_r), 12));
   fault_code    <= code_r;
-
-  -- Reading. The indices of other tables are meaningless, but within the tables.
-  channel    <= unsigned(read_address(12 downto 4));
-  fault_read <= read_address(CHANNEL_BITS+3 downto 0);
-  sub_read   <= read_address(SUB_BITS+3 downto 4);
-  pub_read   <= std_logic_vector(resize(channel - SUBSCRIBERS, PUB_BITS));
-
-  note_place : process (clk)
-  begin
-    if rising_edge(clk) then
-      word_r     <= read_address(3 downto 0);
-      is_sub_r   <= is_below(std_logic_vector(channel), SUBSCRIBERS);
-      is_known_r <= is_below(std_logic_vector(channel), CHANNELS);
-    end if;
-  end process note_place;
-
-  read_counter : process (clk)
-  begin
-    if rising_edge(clk) then
-      read_word <= (others => '0');
-      if is_known_r = '0' then
-        read_word <= (others => '0');
-      elsif word_r = FRAMES and is_sub_r = '1' then
-        read_word(COUNT_BITS-1 downto 0) <= sub_frames;
-      elsif word_r = FRAMES then
-        read_word(COUNT_BITS-1 downto 0) <= pub_frames;
-      elsif word_r = WAITED and is_sub_r = '1' then
-        read_word(WAIT_BITS-1 downto 0) <= sub_longest;
-      elsif word_r = WAITED then
-        read_word(WAIT_BITS-1 downto 0) <= pub_longest;
-      elsif word_r = STAMPED and is_sub_r = '1' then
-        read_word <= sub_stamp;
-      elsif word_r = STAMPED then
-        read_word <= pub_stamp;
-      else
-        read_word(COUNT_BITS-1 downto 0) <= faults;
-      end if;
-    end if;
-  end process read_counter;
-
-  is_clear <= sub_clear and pub_clear and fault_clear;
 
 end architecture rtl;

@@ -70,46 +70,21 @@ architecture rtl of firm_status_tree_counters is
   constant SUB_BITS      : positive := index_bits(SUBSCRIBERS);
   constant PUB_BITS      : positive := index_bits(PUBLISHERS);
   constant CHANNEL_BITS  : positive := index_bits(CHANNELS);
-  constant LONGEST       : unsigned(WAIT_BITS-1 downto 0) := (others => '1');
-  constant FRAMES        : std_logic_vector(3 downto 0) := "1101";
-  constant WAITED        : std_logic_vector(3 downto 0) := "1110";
-  constant STAMPED       : std_logic_vector(3 downto 0) := "1111";
 
-  -- Beats to subscribers. At most one is addressed, so one counter measures all waits.
-  signal sub_beat_r   : std_logic;
-  signal sub_last_r   : std_logic;
-  signal sub_index_r  : std_logic_vector(SUB_BITS-1 downto 0) := (others => '0');
-  signal sub_wait_r   : unsigned(WAIT_BITS-1 downto 0);
-  signal sub_waited_r : unsigned(WAIT_BITS-1 downto 0);
-  signal sub_read     : std_logic_vector(SUB_BITS-1 downto 0);
-  signal sub_frames   : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal sub_longest  : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal sub_clear    : std_logic;
-  signal sub_stamp    : std_logic_vector(31 downto 0);
+  signal sub_beat_r  : std_logic;
+  signal sub_index_r : std_logic_vector(SUB_BITS-1 downto 0) := (others => '0');
+  signal pub_frame_r : std_logic;
+  signal pub_index_r : std_logic_vector(PUB_BITS-1 downto 0) := (others => '0');
+  signal waits_index : std_logic_vector(PUB_BITS-1 downto 0);
+  signal waits_read  : std_logic_vector(WAIT_BITS-1 downto 0);
 
-  -- Beats of publishers.
-  signal pub_frame_r  : std_logic;
-  signal pub_index_r  : std_logic_vector(PUB_BITS-1 downto 0) := (others => '0');
-  signal pub_read     : std_logic_vector(PUB_BITS-1 downto 0);
-  signal pub_frames   : std_logic_vector(COUNT_BITS-1 downto 0);
-  signal pub_longest  : std_logic_vector(WAIT_BITS-1 downto 0);
-  signal pub_clear    : std_logic;
-  signal wait_clear   : std_logic;
-  signal pub_stamp    : std_logic_vector(31 downto 0);
-
-  -- Faults.
   signal counted      : std_logic;
   signal fault_number : std_logic_vector(CHANNEL_BITS-1 downto 0);
   signal code         : std_logic_vector(3 downto 0);
-  signal fault_index  : std_logic_vector(CHANNEL_BITS+3 downto 0);
-  signal fault_read   : std_logic_vector(CHANNEL_BITS+3 downto 0);
-  signal faults       : std_logic_vector(FAULT_BITS-1 downto 0);
-  signal fault_clear  : std_logic;
 
-  signal channel      : unsigned(11 downto 0);
-  signal word_r       : std_logic_vector(3 downto 0);
-  signal is_sub_r     : std_logic;
-  signal is_known_r   : std_logic;
+  signal tables_clear : std_logic;
+  signal waits_clear  : std_logic;
+  signal fault_clear  : std_logic;
 
 begin
 
@@ -117,86 +92,22 @@ begin
     report "firm_status_tree_counters: SUBSCRIBERS is " & integer'image(SUBSCRIBERS) & " and PUBLISHERS is " &
     integer'image(PUBLISHERS) & "; legal: 1 or more each, and at most " & integer'image(MOST_CHANNELS) & " together"
     severity failure;
-  assert COUNT_BITS >= 1 and COUNT_BITS <= 32
-    report "firm_status_tree_counters: COUNT_BITS is " & integer'image(COUNT_BITS) & "; legal: 1 to 32"
-    severity failure;
-  assert FAULT_BITS >= 1 and FAULT_BITS <= 32
-    report "firm_status_tree_counters: FAULT_BITS is " & integer'image(FAULT_BITS) & "; legal: 1 to 32"
-    severity failure;
-  assert WAIT_BITS >= 1 and WAIT_BITS <= 32
-    report "firm_status_tree_counters: WAIT_BITS is " & integer'image(WAIT_BITS) & "; legal: 1 to 32"
-    severity failure;
 
-  -- From the host.
-  watch_subscribers : process (clk)
+  watch_beats : process (clk)
   begin
     if rising_edge(clk) then
-      sub_beat_r   <= sub_beat and enable;
-      sub_last_r   <= sub_last;
-      sub_index_r  <= sub_selected;
-      sub_waited_r <= sub_wait_r;
-      if rst_n = '0' or sub_beat = '1' then
-        sub_wait_r <= (others => '0');
-      elsif sub_offered = '1' and sub_wait_r /= LONGEST then
-        sub_wait_r <= sub_wait_r + 1;
-      end if;
-      if rst_n = '0' then
-        sub_beat_r  <= '0';
-        sub_index_r <= (others => '0');
-      end if;
-    end if;
-  end process watch_subscribers;
-
-  u_subscribers : entity firm.firm_status_tally
-    generic map (
-      INDEX_BITS   => SUB_BITS,
-      COUNT_BITS   => COUNT_BITS,
-      LONGEST_BITS => WAIT_BITS
-    )
-    port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => sub_clear,
-      op_valid     => sub_beat_r,
-      op_index     => sub_index_r,
-      op_count     => sub_last_r,
-      op_longest   => std_logic_vector(sub_waited_r),
-      read_index   => sub_read,
-      read_count   => sub_frames,
-      read_longest => sub_longest
-    );
-
-  -- To the host.
-  watch_publishers : process (clk)
-  begin
-    if rising_edge(clk) then
+      sub_beat_r  <= sub_beat and enable;
+      sub_index_r <= sub_selected;
       pub_frame_r <= m_axis_tvalid and m_axis_tready and m_axis_tlast and enable;
       pub_index_r <= m_axis_tid(PUB_BITS-1 downto 0);
       if rst_n = '0' then
+        sub_beat_r  <= '0';
+        sub_index_r <= (others => '0');
         pub_frame_r <= '0';
         pub_index_r <= (others => '0');
       end if;
     end if;
-  end process watch_publishers;
-
-  u_publishers : entity firm.firm_status_tally
-    generic map (
-      INDEX_BITS   => PUB_BITS,
-      COUNT_BITS   => COUNT_BITS,
-      LONGEST_BITS => 1
-    )
-    port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => pub_clear,
-      op_valid     => pub_frame_r,
-      op_index     => pub_index_r,
-      op_count     => '1',
-      op_longest   => "0",
-      read_index   => pub_read,
-      read_count   => pub_frames,
-      read_longest => open
-    );
+  end process watch_beats;
 
   u_waits : entity firm.firm_status_waits
     generic map (
@@ -206,71 +117,12 @@ begin
     port map (
       clk          => clk,
       rst_n        => rst_n,
-      is_clear     => wait_clear,
+      is_clear     => waits_clear,
       enable       => enable,
       waits        => pub_waits,
-      read_index   => pub_read,
-      read_longest => pub_longest
+      read_index   => waits_index,
+      read_longest => waits_read
     );
-
-  -- Time stamps
-  without_stamps : if not TIME_STAMPS generate
-    cycles    <= (others => '0');
-    sub_stamp <= (others => '0');
-    pub_stamp <= (others => '0');
-  end generate without_stamps;
-
-  with_stamps : if TIME_STAMPS generate
-    signal cycles_r     : unsigned(31 downto 0);
-    signal is_first_r   : std_logic;  -- the next beat to a subscriber is the first one of its frame
-    signal was_first_r  : std_logic;
-    signal stamps_first : std_logic;
-  begin
-    count_cycles : process (clk)
-    begin
-      if rising_edge(clk) then
-        cycles_r    <= cycles_r + 1;
-        was_first_r <= is_first_r;
-        if sub_beat = '1' then
-          is_first_r <= sub_last;
-        end if;
-        if rst_n = '0' then
-          cycles_r   <= (others => '0');
-          is_first_r <= '1';
-        end if;
-      end if;
-    end process count_cycles;
-
-    cycles       <= std_logic_vector(cycles_r);
-    stamps_first <= sub_beat_r and was_first_r;
-
-    u_first_beats : entity firm.firm_status_stamps
-      generic map (
-        INDEX_BITS => SUB_BITS
-      )
-      port map (
-        clk        => clk,
-        op_valid   => stamps_first,
-        op_index   => sub_index_r,
-        op_stamp   => std_logic_vector(cycles_r),
-        read_index => sub_read,
-        read_stamp => sub_stamp
-      );
-
-    u_last_beats : entity firm.firm_status_stamps
-      generic map (
-        INDEX_BITS => PUB_BITS
-      )
-      port map (
-        clk        => clk,
-        op_valid   => pub_frame_r,
-        op_index   => pub_index_r,
-        op_stamp   => std_logic_vector(cycles_r),
-        read_index => pub_read,
-        read_stamp => pub_stamp
-      );
-
-  end generate with_stamps;
 
   u_collect : entity firm.firm_status_faults
     generic map (
@@ -289,71 +141,43 @@ begin
       lost             => lost
     );
 
-  fault_index <= fault_number & code;
-
-  u_faults : entity firm.firm_status_tally
+  u_tables : entity firm.firm_status_tables
     generic map (
-      INDEX_BITS   => CHANNEL_BITS + 4,
-      COUNT_BITS   => FAULT_BITS,
-      LONGEST_BITS => 1,
+      SUBSCRIBERS  => SUBSCRIBERS,
+      PUBLISHERS   => PUBLISHERS,
+      COUNT_BITS   => COUNT_BITS,
+      FAULT_BITS   => FAULT_BITS,
+      WAIT_BITS    => WAIT_BITS,
+      TIME_STAMPS  => TIME_STAMPS,
+      STORES_WAITS => false,
       SHARED_READ  => true
     )
     port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      is_clear     => fault_clear,
-      op_valid     => counted,
-      op_index     => fault_index,
-      op_count     => '1',
-      op_longest   => "0",
-      read_index   => fault_read,
-      read_count   => faults,
-      read_longest => open
+      clk           => clk,
+      rst_n         => rst_n,
+      is_clear      => tables_clear,
+      fault_clear   => fault_clear,
+      sub_offered   => sub_offered,
+      sub_beat      => sub_beat,
+      sub_last      => sub_last,
+      sub_valid     => sub_beat_r,
+      sub_index     => sub_index_r,
+      pub_valid     => pub_frame_r,
+      pub_index     => pub_index_r,
+      pub_last      => '1',
+      waits_index   => waits_index,
+      waits_read    => waits_read,
+      fault         => counted,
+      fault_channel => fault_number,
+      fault_code    => code,
+      cycles        => cycles,
+      read_address  => read_address,
+      read_word     => read_word
     );
 
+  is_clear      <= tables_clear and waits_clear;
   fault         <= counted;
   fault_channel <= std_logic_vector(resize(unsigned(fault_number), 12));
   fault_code    <= code;
-
-  -- Reading. An index that belongs to another table is meaningless, but within the range of its own.
-  channel    <= unsigned(read_address(15 downto 4));
-  fault_read <= std_logic_vector(resize(unsigned(read_address), CHANNEL_BITS+4));
-  sub_read   <= read_address(SUB_BITS+3 downto 4);
-  pub_read   <= std_logic_vector(resize(channel - SUBSCRIBERS, PUB_BITS));
-
-  note_place : process (clk)
-  begin
-    if rising_edge(clk) then
-      word_r     <= read_address(3 downto 0);
-      is_sub_r   <= is_below(std_logic_vector(channel), SUBSCRIBERS);
-      is_known_r <= is_below(std_logic_vector(channel), CHANNELS);
-    end if;
-  end process note_place;
-
-  read_counter : process (clk)
-  begin
-    if rising_edge(clk) then
-      read_word <= (others => '0');
-      if is_known_r = '0' then
-        null;
-      elsif word_r = FRAMES and is_sub_r = '1' then
-        read_word(COUNT_BITS-1 downto 0) <= sub_frames;
-      elsif word_r = FRAMES then
-        read_word(COUNT_BITS-1 downto 0) <= pub_frames;
-      elsif word_r = WAITED and is_sub_r = '1' then
-        read_word(WAIT_BITS-1 downto 0) <= sub_longest;
-      elsif word_r = WAITED then
-        read_word(WAIT_BITS-1 downto 0) <= pub_longest;
-      elsif word_r = STAMPED and is_sub_r = '1' then
-        read_word <= sub_stamp;
-      elsif word_r = STAMPED then
-        read_word <= pub_stamp;
-      else
-        read_word(FAULT_BITS-1 downto 0) <= faults;
-      end if;
-    end if;
-  end process read_counter;
-
-  is_clear <= sub_clear and pub_clear and wait_clear and fault_clear;
 
 end architecture rtl;
