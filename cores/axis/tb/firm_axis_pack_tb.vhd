@@ -4,11 +4,11 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_axis_pack_tb is
   generic (
@@ -86,15 +86,8 @@ begin
     variable is_ended : boolean;
     variable offers   : natural := 0;
     variable waits    : natural := 0;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
-
-    impure function draw_to(highest : natural) return natural is
-    begin
-      uniform(random_1, random_2, draw);
-      return integer(floor(draw * real(highest + 1)));
-    end function draw_to;
+    variable ends_now : natural;
+    variable random   : random_t := seeded(SEED, 3);
 
     -- The expected `data` and `count` until they are taken.
     procedure offer(is_end : in boolean) is
@@ -119,10 +112,7 @@ begin
 
   begin
     read_stimulus_file(STIMULUS_FILE, content);
-    for cycle in 1 to 4 loop
-      wait until falling_edge(clk);
-    end loop;
-    rst_n <= '1';
+    end_reset(clk, '0', rst_n);
     wait until falling_edge(clk) and ready = '1';
     frame := content.first;
     while frame /= null loop
@@ -133,16 +123,13 @@ begin
         offer(true);
       end if;
       while not is_ended loop
-        loop
-          uniform(random_1, random_2, draw);
-          exit when 100.0 * draw >= real(SOURCE_STALL_PERCENT);
-          wait until falling_edge(clk);
-        end loop;
+        pause(clk, '0', random, SOURCE_STALL_PERCENT);
         size := LANES;
         if PIECES = "random" then
-          size := draw_to(LANES);
+          draw(random, LANES, size);
         elsif PIECES = "shifted" and place = 0 then
-          size := 1 + draw_to(LANES-1);
+          draw(random, LANES-1, size);
+          size := size + 1;
         end if;
         if size > frame.size - place then
           size := frame.size - place;
@@ -152,7 +139,11 @@ begin
           data(8*lane+7 downto 8*lane) <= to_byte(frame.bytes(place+lane+1));
         end loop;
         place    := place + size;
-        is_ended := place = frame.size and (PIECES /= "random" or draw_to(2) > 0);
+        is_ended := place = frame.size;
+        if is_ended and PIECES = "random" then
+          draw(random, 2, ends_now);
+          is_ended := ends_now > 0;
+        end if;
         count    <= std_logic_vector(to_unsigned(size, COUNT_BITS));
         offer(is_ended);
       end loop;
@@ -176,15 +167,12 @@ begin
     variable is_stalled : boolean := false;
     variable stalled    : std_logic_vector(WIDTH+LANES+1 downto 0);
     variable is_ending  : boolean;  -- lanes from here on are empty
-    variable random_1   : positive := SEED;
-    variable random_2   : positive := 5;
-    variable draw       : real;
+    variable random     : random_t := seeded(SEED, 5);
   begin
     wait until rst_n = '1';
     while not (all_sent and frames = frames_sent) loop
-      uniform(random_1, random_2, draw);
-      tready <= '1';
-      if 100.0 * draw < real(SINK_STALL_PERCENT) or (LATE_READY and tvalid = '0') then
+      draw_ready(random, SINK_STALL_PERCENT, tready);
+      if LATE_READY and tvalid = '0' then
         tready <= '0';
       end if;
       wait until rising_edge(clk);

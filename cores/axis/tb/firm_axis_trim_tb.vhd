@@ -6,11 +6,11 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_axis_trim_tb is
   generic (
@@ -92,30 +92,18 @@ begin
     );
 
   send : process
-    variable content  : frame_file_t;
-    variable frame    : frame_ptr_t;
-    variable place    : natural;
-    variable size     : natural;
-    variable said     : std_logic_vector(31 downto 0);
-    variable frames   : natural  := 0;
-    variable waits    : natural  := 0;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
-
-    impure function draw_to(highest : natural) return natural is
-    begin
-      uniform(random_1, random_2, draw);
-      return integer(floor(draw * real(highest + 1)));
-    end function draw_to;
+    variable content : frame_file_t;
+    variable frame   : frame_ptr_t;
+    variable place   : natural;
+    variable size    : natural;
+    variable said    : std_logic_vector(31 downto 0);
+    variable frames  : natural  := 0;
+    variable waits   : natural  := 0;
+    variable random  : random_t := seeded(SEED, 3);
 
     procedure offer is
     begin
-      loop
-        uniform(random_1, random_2, draw);
-        exit when 100.0 * draw >= real(SOURCE_STALL_PERCENT);
-        wait until falling_edge(clk);
-      end loop;
+      pause(clk, '0', random, SOURCE_STALL_PERCENT);
       valid <= '1';
       loop
         wait until rising_edge(clk);
@@ -129,10 +117,7 @@ begin
 
   begin
     read_stimulus_file(STIMULUS_FILE, content);
-    for cycle in 1 to 4 loop
-      wait until falling_edge(clk);
-    end loop;
-    rst_n <= '1';
+    end_reset(clk, '0', rst_n);
     frame := content.first;
     while frame /= null loop
       for part in 0 to 3 loop
@@ -158,7 +143,7 @@ begin
             size := LANES;
           end if;
         elsif not FULL_PIECES then
-          size := draw_to(LANES);
+          draw(random, LANES, size);
         end if;
         if size > frame.size - place then
           size := frame.size - place;
@@ -198,17 +183,11 @@ begin
     variable watch        : natural := 0;
     variable was_cut      : boolean := false;
     variable was_lacking  : boolean := false;
-    variable random_1     : positive := SEED;
-    variable random_2     : positive := 5;
-    variable draw         : real;
+    variable random       : random_t := seeded(SEED, 5);
   begin
     wait until rst_n = '1';
     loop
-      uniform(random_1, random_2, draw);
-      m_ready <= '1';
-      if 100.0 * draw < real(SINK_STALL_PERCENT) then
-        m_ready <= '0';
-      end if;
+      draw_ready(random, SINK_STALL_PERCENT, m_ready);
       wait until rising_edge(clk);
       watch := watch + 1;
       assert watch < WATCHDOG report "nothing comes" severity failure;

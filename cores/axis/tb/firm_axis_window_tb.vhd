@@ -6,11 +6,11 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_axis_window_tb is
   generic (
@@ -93,25 +93,16 @@ begin
     variable place    : natural;  -- of the next byte
     variable beats    : natural := 0;
     variable waits    : natural := 0;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+    variable random   : random_t := seeded(SEED, 3);
   begin
     read_stimulus_file(STIMULUS_FILE, content);
-    for cycle in 1 to 4 loop
-      wait until falling_edge(clk);
-    end loop;
-    rst_n <= '1';
+    end_reset(clk, '0', rst_n);
     frames <= content.frames;
     frame  := content.first;
     while frame /= null loop
       place := 0;
       while place < frame.size loop
-        loop
-          uniform(random_1, random_2, draw);
-          exit when 100.0 * draw >= real(SOURCE_STALL_PERCENT);
-          wait until falling_edge(clk);
-        end loop;
+        pause(clk, '0', random, SOURCE_STALL_PERCENT);
         tdata  <= (others => 'X');
         tkeep  <= (others => '0');
         tvalid <= '1';
@@ -162,20 +153,20 @@ begin
     variable idle     : natural := 0;
     variable idle_max : natural := 0;  -- between frames, though the next has been sent
     variable watch    : natural := 0;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
+    variable random   : random_t := seeded(SEED, 5);
 
     impure function chance(percent : natural) return boolean is
+      variable happens : boolean;
     begin
-      uniform(random_1, random_2, draw);
-      return 100.0 * draw < real(percent);
+      draw_chance(random, percent, happens);
+      return happens;
     end function chance;
 
     impure function draw_to(highest : natural) return natural is
+      variable number : natural;
     begin
-      uniform(random_1, random_2, draw);
-      return integer(floor(draw * real(highest + 1)));
+      draw(random, highest, number);
+      return number;
     end function draw_to;
 
     procedure finish_frame(mark : in character) is

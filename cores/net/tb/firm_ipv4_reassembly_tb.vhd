@@ -6,7 +6,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
-use firm.firm_sim_pkg.keep_time;
+use firm.firm_sim_pkg.all;
 
 entity firm_ipv4_reassembly_tb is
   generic (
@@ -39,14 +39,8 @@ architecture simulation of firm_ipv4_reassembly_tb is
   signal tick  : std_logic := '0';
   signal ms    : natural   := 0;
 
-  signal s_tdata    : std_logic_vector(7 downto 0);
-  signal s_tuser    : std_logic_vector(0 downto 0);
-  signal s_tvalid   : std_logic;
-  signal s_tlast    : std_logic;
-  signal m_tdata    : std_logic_vector(7 downto 0);
-  signal m_tuser    : std_logic_vector(0 downto 0);
-  signal m_tvalid   : std_logic;
-  signal m_tlast    : std_logic;
+  signal sent       : bytes_t;
+  signal received   : bytes_t;
   signal rests      : std_logic := '1';
   signal is_dropped : std_logic;
   signal is_lost    : std_logic;
@@ -70,55 +64,40 @@ begin
       tick          => tick,
       mac           => x"020000000002",
       address       => x"c0000202",
-      s_axis_tdata  => s_tdata,
-      s_axis_tuser  => s_tuser,
-      s_axis_tvalid => s_tvalid,
-      s_axis_tlast  => s_tlast,
-      m_axis_tdata  => m_tdata,
-      m_axis_tuser  => m_tuser,
-      m_axis_tvalid => m_tvalid,
-      m_axis_tlast  => m_tlast,
+      s_axis_tdata  => sent.tdata,
+      s_axis_tuser  => sent.tuser,
+      s_axis_tvalid => sent.tvalid,
+      s_axis_tlast  => sent.tlast,
+      m_axis_tdata  => received.tdata,
+      m_axis_tuser  => received.tuser,
+      m_axis_tvalid => received.tvalid,
+      m_axis_tlast  => received.tlast,
       rests         => rests,
       is_dropped    => is_dropped,
       is_lost       => is_lost
     );
 
-  u_rows : entity firm.firm_sim_rows
-    generic map (
-      FRAME_FILE   => FRAME_FILE,
-      SEED         => SEED,
-      SLOW_PERCENT => SLOW_PERCENT,
-      LAST_CYCLES  => LAST_CYCLES
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      m_axis_tdata  => s_tdata,
-      m_axis_tuser  => s_tuser,
-      m_axis_tvalid => s_tvalid,
-      m_axis_tlast  => s_tlast,
-      over          => over
-    );
-
   keep_time(clk, rst_n, TICK_CYCLES, tick, ms);
 
-  u_record : entity firm.firm_sim_record
+  u_exchange : entity firm.firm_sim_exchange
     generic map (
+      FRAME_FILE    => FRAME_FILE,
       RESULT_FILE   => RESULT_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
+      SEED          => SEED,
+      SLOW_PERCENT  => SLOW_PERCENT,
+      LAST_CYCLES   => LAST_CYCLES,
       SHOWS_USER    => true
     )
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      over          => over,
-      s_axis_tdata  => m_tdata,
-      s_axis_tuser  => m_tuser,
-      s_axis_tvalid => m_tvalid,
-      s_axis_tlast  => m_tlast,
-      s_axis_tready => open,
-      is_dropped    => is_dropped,
-      is_lost       => is_lost
+      clk        => clk,
+      rst_n      => rst_n,
+      over       => over,
+      sent       => sent,
+      received   => received,
+      ready      => open,
+      is_dropped => is_dropped,
+      is_lost    => is_lost
     );
 
   check_gaps : process (clk)
@@ -127,11 +106,11 @@ begin
   begin
     if rising_edge(clk) and rst_n = '1' then
       idle := idle + 1;
-      if m_tvalid = '1' then
+      if received.tvalid = '1' then
         assert is_open or idle > GAP
           report "two frames without a gap" severity failure;
         idle    := 0;
-        is_open := m_tlast = '0';
+        is_open := received.tlast = '0';
       end if;
     end if;
   end process check_gaps;
@@ -146,13 +125,13 @@ begin
       if left /= 0 then
         left := left - 1;
       end if;
-      if m_tvalid = '1' then
+      if received.tvalid = '1' then
         if count = 0 then
           is_late := left = 0 or ms - since >= HOLD_TICKS-1;
         end if;
         count := count + 1;
-        if m_tlast = '1' then
-          if count >= HEAD+LONG and m_tuser = "0" then
+        if received.tlast = '1' then
+          if count >= HEAD+LONG and received.tuser = "0" then
             assert is_late
               report "a long packet begins while the user is busy" severity failure;
             left  := REST+BUSY_CYCLES;

@@ -5,9 +5,9 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_mac_receiver_tb is
   generic (
@@ -96,15 +96,13 @@ begin
     );
 
   play : process
-    file bursts       : text open read_mode is LINE_FILE;
-    variable row      : line;
-    variable idle     : integer;
-    variable fault    : integer;
-    variable size     : integer;
-    variable byte     : integer;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+    file bursts     : text open read_mode is LINE_FILE;
+    variable row    : line;
+    variable idle   : integer;
+    variable fault  : integer;
+    variable size   : integer;
+    variable byte   : integer;
+    variable random : random_t := seeded(SEED, 3);
 
     procedure show(dv : in std_logic; er : in std_logic; value : in natural) is
     begin
@@ -112,21 +110,14 @@ begin
         rx_dv   <= dv;
         rx_er   <= er;
         rxd     <= std_logic_vector(to_unsigned(value, 8));
-        rx_step <= '1';
-        uniform(random_1, random_2, draw);
-        if 100.0 * draw < real(SLOW_PERCENT) then
-          rx_step <= '0';
-        end if;
+        draw_ready(random, SLOW_PERCENT, rx_step);
         wait until rising_edge(clk);
         exit when rx_step = '1';
       end loop;
     end procedure show;
 
   begin
-    for cycle in 1 to 4 loop
-      wait until rising_edge(clk);
-    end loop;
-    rst_n <= '1';
+    end_reset(clk, '1', rst_n);
     while not endfile(bursts) loop
       readline(bursts, row);
       read(row, idle);

@@ -5,6 +5,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_sim_pkg.bytes_t;
 
 entity firm_net_responder_tb is
   generic (
@@ -28,15 +29,9 @@ architecture simulation of firm_net_responder_tb is
   signal rst_n : std_logic;
   signal over  : boolean;
 
-  signal s_tdata  : std_logic_vector(7 downto 0);
-  signal s_tuser  : std_logic_vector(0 downto 0);
-  signal s_tvalid : std_logic;
-  signal s_tlast  : std_logic;
-
-  signal m_tdata  : std_logic_vector(7 downto 0);
-  signal m_tvalid : std_logic;
-  signal m_tlast  : std_logic;
-  signal m_tready : std_logic;
+  signal sent     : bytes_t;
+  signal received : bytes_t;
+  signal ready    : std_logic;
   signal is_lost  : std_logic;
 
 begin
@@ -52,50 +47,35 @@ begin
       rst_n         => rst_n,
       mac           => x"020000000002",
       address       => x"c0000202",
-      s_axis_tdata  => s_tdata,
-      s_axis_tuser  => s_tuser,
-      s_axis_tvalid => s_tvalid,
-      s_axis_tlast  => s_tlast,
-      m_axis_tdata  => m_tdata,
-      m_axis_tvalid => m_tvalid,
-      m_axis_tlast  => m_tlast,
-      m_axis_tready => m_tready,
+      s_axis_tdata  => sent.tdata,
+      s_axis_tuser  => sent.tuser,
+      s_axis_tvalid => sent.tvalid,
+      s_axis_tlast  => sent.tlast,
+      m_axis_tdata  => received.tdata,
+      m_axis_tvalid => received.tvalid,
+      m_axis_tlast  => received.tlast,
+      m_axis_tready => ready,
       is_lost       => is_lost
     );
 
-  u_rows : entity firm.firm_sim_rows
+  u_exchange : entity firm.firm_sim_exchange
     generic map (
-      FRAME_FILE   => FRAME_FILE,
-      SEED         => SEED,
-      SLOW_PERCENT => SLOW_PERCENT,
-      LAST_CYCLES  => LAST_CYCLES
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      m_axis_tdata  => s_tdata,
-      m_axis_tuser  => s_tuser,
-      m_axis_tvalid => s_tvalid,
-      m_axis_tlast  => s_tlast,
-      over          => over
-    );
-
-  u_record : entity firm.firm_sim_record
-    generic map (
+      FRAME_FILE    => FRAME_FILE,
       RESULT_FILE   => RESULT_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
       SEED          => SEED,
-      STALL_PERCENT => STALL_PERCENT
+      SLOW_PERCENT  => SLOW_PERCENT,
+      STALL_PERCENT => STALL_PERCENT,
+      LAST_CYCLES   => LAST_CYCLES
     )
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      over          => over,
-      s_axis_tdata  => m_tdata,
-      s_axis_tvalid => m_tvalid,
-      s_axis_tlast  => m_tlast,
-      s_axis_tready => m_tready,
-      is_lost       => is_lost
+      clk      => clk,
+      rst_n    => rst_n,
+      over     => over,
+      sent     => sent,
+      received => received,
+      ready    => ready,
+      is_lost  => is_lost
     );
 
 end architecture simulation;

@@ -4,8 +4,9 @@
 -- its payload's word inverted. The replies go to a file, a row each: the number of bytes, and the bytes.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.math_real.all;
 library firm;
+use firm.firm_sim_pkg.bytes_t;
+use firm.firm_sim_random_pkg.stall;
 
 entity firm_net_status_tb is
   generic (
@@ -33,15 +34,9 @@ architecture simulation of firm_net_status_tb is
   signal rst_n : std_logic;
   signal over  : boolean;
 
-  signal s_tdata  : std_logic_vector(7 downto 0);
-  signal s_tuser  : std_logic_vector(0 downto 0);
-  signal s_tvalid : std_logic;
-  signal s_tlast  : std_logic;
-
-  signal m_tdata  : std_logic_vector(7 downto 0);
-  signal m_tvalid : std_logic;
-  signal m_tlast  : std_logic;
-  signal m_tready : std_logic;
+  signal sent     : bytes_t;
+  signal received : bytes_t;
+  signal ready    : std_logic;
 
   signal request_tdata  : std_logic_vector(7 downto 0);
   signal request_tvalid : std_logic;
@@ -61,10 +56,10 @@ begin
       rst_n          => rst_n,
       mac            => x"020000000002",
       address        => x"c0000202",
-      s_axis_tdata   => s_tdata,
-      s_axis_tuser   => s_tuser,
-      s_axis_tvalid  => s_tvalid,
-      s_axis_tlast   => s_tlast,
+      s_axis_tdata   => sent.tdata,
+      s_axis_tuser   => sent.tuser,
+      s_axis_tvalid  => sent.tvalid,
+      s_axis_tlast   => sent.tlast,
       request_tdata  => request_tdata,
       request_tvalid => request_tvalid,
       request_tlast  => request_tlast,
@@ -72,42 +67,13 @@ begin
       answer_tdata   => answer_tdata,
       answer_tvalid  => answer_tvalid,
       answer_tlast   => answer_tlast,
-      m_axis_tdata   => m_tdata,
-      m_axis_tvalid  => m_tvalid,
-      m_axis_tlast   => m_tlast,
-      m_axis_tready  => m_tready
+      m_axis_tdata   => received.tdata,
+      m_axis_tvalid  => received.tvalid,
+      m_axis_tlast   => received.tlast,
+      m_axis_tready  => ready
     );
 
-  u_rows : entity firm.firm_sim_rows
-    generic map (
-      FRAME_FILE   => FRAME_FILE,
-      SEED         => SEED,
-      SLOW_PERCENT => SLOW_PERCENT,
-      LAST_CYCLES  => LAST_CYCLES
-    )
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      m_axis_tdata  => s_tdata,
-      m_axis_tuser  => s_tuser,
-      m_axis_tvalid => s_tvalid,
-      m_axis_tlast  => s_tlast,
-      over          => over
-    );
-
-  take : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 7;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      request_tready <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        request_tready <= '0';
-      end if;
-    end if;
-  end process take;
+  stall(clk, SEED, 7, STALL_PERCENT, request_tready);
 
   answer : process
     variable frame : frame_t;
@@ -143,21 +109,23 @@ begin
     end loop;
   end process answer;
 
-  u_record : entity firm.firm_sim_record
+  u_exchange : entity firm.firm_sim_exchange
     generic map (
+      FRAME_FILE    => FRAME_FILE,
       RESULT_FILE   => RESULT_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
       SEED          => SEED,
-      STALL_PERCENT => STALL_PERCENT
+      SLOW_PERCENT  => SLOW_PERCENT,
+      STALL_PERCENT => STALL_PERCENT,
+      LAST_CYCLES   => LAST_CYCLES
     )
     port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      over          => over,
-      s_axis_tdata  => m_tdata,
-      s_axis_tvalid => m_tvalid,
-      s_axis_tlast  => m_tlast,
-      s_axis_tready => m_tready
+      clk      => clk,
+      rst_n    => rst_n,
+      over     => over,
+      sent     => sent,
+      received => received,
+      ready    => ready
     );
 
 end architecture simulation;

@@ -7,9 +7,9 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_packet_builder_tb is
   generic (
@@ -114,18 +114,13 @@ begin
   end process show_program;
 
   send : process
-    file jobs         : text open read_mode is JOB_FILE;
-    variable row      : line;
-    variable number   : integer;
-    variable size     : integer;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+    file jobs       : text open read_mode is JOB_FILE;
+    variable row    : line;
+    variable number : integer;
+    variable size   : integer;
+    variable random : random_t := seeded(SEED, 3);
   begin
-    for cycle in 1 to 4 loop
-      wait until rising_edge(clk);
-    end loop;
-    rst_n <= '1';
+    end_reset(clk, '1', rst_n);
     while not endfile(jobs) loop
       readline(jobs, row);
       read(row, number);
@@ -150,11 +145,7 @@ begin
       start <= '0';
       for place in 1 to size loop
         read(row, number);
-        loop
-          uniform(random_1, random_2, draw);
-          exit when 100.0 * draw >= real(SLOW_PERCENT);
-          wait until rising_edge(clk);
-        end loop;
+        pause(clk, '1', random, SLOW_PERCENT);
         s_tvalid <= '1';
         s_tdata  <= std_logic_vector(to_unsigned(number, 8));
         loop

@@ -11,6 +11,14 @@ package firm_sim_pkg is
 
   subtype byte_t is std_logic_vector(7 downto 0);
 
+  -- A stream of bytes without its tready, between two entities of a bench.
+  type bytes_t is record
+    tdata  : byte_t;
+    tuser  : std_logic_vector(0 downto 0);
+    tvalid : std_logic;
+    tlast  : std_logic;
+  end record bytes_t;
+
   type frame_t;
   type frame_ptr_t is access frame_t;
   type frame_t is record

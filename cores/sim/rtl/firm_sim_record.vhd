@@ -5,10 +5,10 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_sim_record is
   generic (
@@ -45,19 +45,7 @@ begin
 
   s_axis_tready <= ready_r;
 
-  stall : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
-  begin
-    if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      ready_r <= '1';
-      if 100.0 * draw < real(STALL_PERCENT) then
-        ready_r <= '0';
-      end if;
-    end if;
-  end process stall;
+  stall(clk, SEED, 5, STALL_PERCENT, ready_r);
 
   take : process
     file results     : text open write_mode is RESULT_FILE;

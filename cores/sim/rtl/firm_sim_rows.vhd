@@ -5,8 +5,9 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
+library firm;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_sim_rows is
   generic (
@@ -32,20 +33,16 @@ end entity firm_sim_rows;
 
 architecture simulation of firm_sim_rows is
 
-  constant RESET_CYCLES : positive := 4;
-
 begin
 
   play : process
-    file frames       : text open read_mode is FRAME_FILE;
-    variable row      : line;
-    variable before   : integer;
-    variable abort    : integer;
-    variable size     : integer;
-    variable byte     : integer;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+    file frames     : text open read_mode is FRAME_FILE;
+    variable row    : line;
+    variable before : integer;
+    variable abort  : integer;
+    variable size   : integer;
+    variable byte   : integer;
+    variable random : random_t := seeded(SEED, 3);
 
     procedure wait_for(cycles : in natural) is
     begin
@@ -61,8 +58,7 @@ begin
     m_axis_tuser  <= "0";
     m_axis_tvalid <= '0';
     m_axis_tlast  <= '0';
-    wait_for(RESET_CYCLES);
-    rst_n <= '1';
+    end_reset(clk, '1', rst_n);
     while not endfile(frames) loop
       readline(frames, row);
       read(row, before);
@@ -71,11 +67,7 @@ begin
       wait_for(before + GAP_CYCLES);
       for place in 0 to size-1 loop
         read(row, byte);
-        loop
-          uniform(random_1, random_2, draw);
-          exit when 100.0 * draw >= real(SLOW_PERCENT);
-          wait until rising_edge(clk);
-        end loop;
+        pause(clk, '1', random, SLOW_PERCENT);
         m_axis_tvalid <= '1';
         m_axis_tdata  <= std_logic_vector(to_unsigned(byte, 8));
         m_axis_tlast  <= '0';
