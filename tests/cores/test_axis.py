@@ -90,6 +90,8 @@ def test_the_fifo_works_at_any_depth(library: Library, tmp_path: Path, depth: in
 def test_the_netlist_of_a_part_does_the_same(tmp_path: Path, part: str) -> None:
     library = _library(tmp_path)
     library.replace_by_netlist(f"firm_axis_{part}", {"WIDTH": 32, **({"DEPTH": 6} if part == "fifo" else {})})
+    # The bench also has parts that use this one.
+    library.analyse(path for path in core_files("axis/axis") if path.stem != f"firm_axis_{part}")
     library.analyse(core_files("axis/axis", fileset="tb"))
     _write_files(tmp_path, 32)
     generics: dict[str, Generic] = {"PART": part, "WIDTH": 32, "DEPTH": 6, "SEED": SEED, "STALL_PERCENT": 40}

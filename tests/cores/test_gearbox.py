@@ -217,8 +217,8 @@ def test_the_packer_joins_what_the_window_cuts(library: Library, tmp_path: Path,
     frames = random_frames(range(256), 100, max(40, width // 2), SEED)
     write_stimulus(tmp_path / "stimulus.txt", (frame.to_bytes() for frame in frames))
     write_expected(tmp_path / "expected.txt", ((n, frame.to_bytes()) for n, frame in enumerate(frames)))
-    generics: Generics = {"WIDTH": width, "SEED": SEED, "STALL_PERCENT": stall}
-    result = library.run("firm_axis_gearbox_tb", generics, directory=tmp_path)
+    generics: Generics = {"PART": "gearbox", "WIDTH": width, "SEED": SEED, "STALL_PERCENT": stall}
+    result = library.run("firm_axis_pipe_tb", generics, directory=tmp_path)
     assert result.exit_code == 0, result.output
     assert result.output.splitlines()[-1] == "PASS 100/100"
     if stall == 0:

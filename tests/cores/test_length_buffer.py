@@ -13,7 +13,7 @@ from tests.hdl.frames import Frame, traffic, write_expected, write_stimulus
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.seeds import seeded
 
-BENCH = "firm_axis_length_buffer_tb"
+BENCH = "firm_axis_pipe_tb"
 WIDTHS = [8, 16, 32, 64, 128, 512]
 SEED = seeded(20240610)
 # Cycles from a frame's last beat in to its first beat out.
@@ -57,7 +57,7 @@ def _write(directory: Path, frames: Sequence[Frame], width: int, depth: int) -> 
 
 
 def _run(library: Library, directory: Path, **generics: Generic) -> str:
-    result = library.run(BENCH, generics, directory=directory)
+    result = library.run(BENCH, {"PART": "length_buffer", **generics}, directory=directory)
     assert result.exit_code == 0, result.output
     return result.output
 
