@@ -7,6 +7,7 @@ use ieee.numeric_std.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sim_check_pkg.all;
 use firm.firm_sim_pkg.all;
 use firm.firm_sim_random_pkg.all;
 
@@ -216,20 +217,6 @@ begin
     wait;
   end process receive;
 
-  u_check_out : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "out",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => tdata,
-      axis_tkeep  => tkeep,
-      axis_tvalid => tvalid,
-      axis_tlast  => tlast,
-      axis_tready => tready
-    );
+  check_stream(clk, rst_n, tdata, tkeep, tvalid, tlast, tready, "out");
 
 end architecture simulation;

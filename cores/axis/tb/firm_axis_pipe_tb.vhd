@@ -8,6 +8,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sim_check_pkg.all;
 use firm.firm_sim_random_pkg.all;
 
 entity firm_axis_pipe_tb is
@@ -350,36 +351,8 @@ begin
     end if;
   end process find_gaps;
 
-  u_check_in : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "in",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => in_tdata,
-      axis_tkeep  => in_tkeep,
-      axis_tvalid => in_tvalid,
-      axis_tlast  => in_tlast,
-      axis_tready => in_tready
-    );
+  check_stream(clk, rst_n, in_tdata, in_tkeep, in_tvalid, in_tlast, in_tready, "in");
 
-  u_check_part : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "part",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => part_tdata,
-      axis_tkeep  => part_tkeep,
-      axis_tvalid => part_tvalid,
-      axis_tlast  => part_tlast,
-      axis_tready => part_tready
-    );
+  check_stream(clk, rst_n, part_tdata, part_tkeep, part_tvalid, part_tlast, part_tready, "part");
 
 end architecture simulation;

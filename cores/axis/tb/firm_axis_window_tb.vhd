@@ -9,6 +9,7 @@ use ieee.numeric_std.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sim_check_pkg.all;
 use firm.firm_sim_pkg.all;
 use firm.firm_sim_random_pkg.all;
 
@@ -261,22 +262,7 @@ begin
       report "a combinational path from an input to an output" severity failure;
   end process find_paths;
 
-  u_check_in : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "in",
-      -- The void lanes are undefined.
-      KNOWN => VOID_LANES = 0,
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => tdata,
-      axis_tkeep  => tkeep,
-      axis_tvalid => tvalid,
-      axis_tlast  => tlast,
-      axis_tready => tready
-    );
+  check_stream(clk, rst_n, tdata, tkeep, tvalid, tlast, tready, "in",
+               (known => VOID_LANES = 0, may_be_empty => false, abort => false, others => true));
 
 end architecture simulation;

@@ -3,6 +3,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_sim_check_pkg.all;
 
 entity firm_link_tb is
   generic (
@@ -237,36 +238,8 @@ begin
       );
   end generate spi;
 
-  u_check_to : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "to",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => to_tdata,
-      axis_tkeep  => to_tkeep,
-      axis_tvalid => to_tvalid,
-      axis_tlast  => to_tlast,
-      axis_tready => to_tready
-    );
+  check_stream(clk, rst_n, to_tdata, to_tkeep, to_tvalid, to_tlast, to_tready, "to");
 
-  u_check_from : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "from",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => from_tdata,
-      axis_tkeep  => from_tkeep,
-      axis_tvalid => from_tvalid,
-      axis_tlast  => from_tlast,
-      axis_tready => from_tready
-    );
+  check_stream(clk, rst_n, from_tdata, from_tkeep, from_tvalid, from_tlast, from_tready, "from");
 
 end architecture simulation;

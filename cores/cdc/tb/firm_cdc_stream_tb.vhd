@@ -9,6 +9,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 use ieee.math_real.all;
 library firm;
+use firm.firm_sim_check_pkg.all;
 
 entity firm_cdc_stream_tb is
   generic (
@@ -305,37 +306,9 @@ begin
     wait;
   end process watchdog;
 
-  u_check_in : entity firm.firm_axis_checker
-    generic map (
-      WIDTH      => S_WIDTH,
-      NAME       => "in",
-      IDLE_READY => false,
-      LEVEL      => failure
-    )
-    port map (
-      clk         => s_clk,
-      rst_n       => s_rst_n,
-      axis_tdata  => s_tdata,
-      axis_tkeep  => s_tkeep,
-      axis_tvalid => s_tvalid,
-      axis_tlast  => s_tlast,
-      axis_tready => s_tready
-    );
+  check_stream(s_clk, s_rst_n, s_tdata, s_tkeep, s_tvalid, s_tlast, s_tready, "in",
+               (idle_ready => false, may_be_empty => false, abort => false, others => true));
 
-  u_check_out : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => M_WIDTH,
-      NAME  => "out",
-      LEVEL => failure
-    )
-    port map (
-      clk         => m_clk,
-      rst_n       => m_rst_n,
-      axis_tdata  => m_tdata,
-      axis_tkeep  => m_tkeep,
-      axis_tvalid => m_tvalid,
-      axis_tlast  => m_tlast,
-      axis_tready => m_tready
-    );
+  check_stream(m_clk, m_rst_n, m_tdata, m_tkeep, m_tvalid, m_tlast, m_tready, "out");
 
 end architecture simulation;

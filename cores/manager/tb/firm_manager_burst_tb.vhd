@@ -11,6 +11,7 @@ use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sim_check_pkg.all;
 use firm.firm_sim_pkg.all;
 
 entity firm_manager_burst_tb is
@@ -359,20 +360,6 @@ begin
     end if;
   end process take;
 
-  u_check_out : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "out",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => out_tdata,
-      axis_tkeep  => out_tkeep,
-      axis_tvalid => out_tvalid,
-      axis_tlast  => out_tlast,
-      axis_tready => out_tready
-    );
+  check_stream(clk, rst_n, out_tdata, out_tkeep, out_tvalid, out_tlast, out_tready, "out");
 
 end architecture simulation;

@@ -5,6 +5,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sim_check_pkg.all;
 
 entity firm_manager_tb is
   generic (
@@ -167,36 +168,8 @@ begin
       pub_tready => pub_tready
     );
 
-  u_check_in : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "in",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => in_tdata,
-      axis_tkeep  => in_tkeep,
-      axis_tvalid => in_tvalid,
-      axis_tlast  => in_tlast,
-      axis_tready => in_tready
-    );
+  check_stream(clk, rst_n, in_tdata, in_tkeep, in_tvalid, in_tlast, in_tready, "in");
 
-  u_check_out : entity firm.firm_axis_checker
-    generic map (
-      WIDTH => WIDTH,
-      NAME  => "out",
-      LEVEL => failure
-    )
-    port map (
-      clk         => clk,
-      rst_n       => rst_n,
-      axis_tdata  => out_tdata,
-      axis_tkeep  => out_tkeep,
-      axis_tvalid => out_tvalid,
-      axis_tlast  => out_tlast,
-      axis_tready => out_tready
-    );
+  check_stream(clk, rst_n, out_tdata, out_tkeep, out_tvalid, out_tlast, out_tready, "out");
 
 end architecture simulation;

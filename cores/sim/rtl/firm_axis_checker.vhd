@@ -7,6 +7,7 @@ library ieee;
 use ieee.std_logic_1164.all;
 library firm;
 use firm.firm_axis_pkg.is_stream_width;
+use firm.firm_sim_check_pkg.all;
 
 entity firm_axis_checker is
   generic (
@@ -49,40 +50,7 @@ end entity firm_axis_checker;
 
 architecture simulation of firm_axis_checker is
 
-  constant LANES : positive := WIDTH/8;
-  constant FULL  : std_logic_vector(LANES-1 downto 0) := (others => '1');
-  constant NONE  : std_logic_vector(LANES-1 downto 0) := (others => '0');
-
-  function is_known(value : std_logic) return boolean is
-  begin
-    return value = '0' or value = '1';
-  end function is_known;
-
-  function is_known(values : std_logic_vector) return boolean is
-  begin
-    for place in values'range loop
-      if not is_known(values(place)) then
-        return false;
-      end if;
-    end loop;
-    return true;
-  end function is_known;
-
-  -- Whether no lane is kept above one that is not.
-  function is_contiguous(lanes_kept : std_logic_vector(LANES-1 downto 0)) return boolean is
-  begin
-    for lane in 1 to LANES-1 loop
-      if lanes_kept(lane) = '1' and lanes_kept(lane-1) = '0' then
-        return false;
-      end if;
-    end loop;
-    return true;
-  end function is_contiguous;
-
-  procedure check(is_right : in boolean; rule : in string; fault : in string) is
-  begin
-    assert is_right report "firm_axis_checker: " & NAME & ": " & rule & ": " & fault severity LEVEL;
-  end procedure check;
+  constant RULES : rules_t := (STABLE, KNOWN, IDLE_READY, KEEP, MAY_BE_EMPTY, RESET, ABORT);
 
 begin
 
@@ -93,75 +61,7 @@ begin
     report "firm_axis_checker: USER_BITS is " & integer'image(USER_BITS) & "; legal: 1 and more"
     severity failure;
 
-  watch : process (clk)
-    variable was_reset  : boolean := false;
-    -- A beat was offered and not accepted.
-    variable is_waiting : boolean := false;
-    variable tdata      : std_logic_vector(WIDTH-1 downto 0);
-    variable tkeep      : std_logic_vector(LANES-1 downto 0);
-    variable tuser      : std_logic_vector(USER_BITS-1 downto 0);
-    variable tlast      : std_logic;
-
-    procedure check_stable is
-    begin
-      check(axis_tvalid /= '0', "stable", "tvalid fell before tready");
-      if axis_tvalid = '1' then
-        check(axis_tdata = tdata, "stable", "tdata changed before tready");
-        check(axis_tkeep = tkeep, "stable", "tkeep changed before tready");
-        check(axis_tlast = tlast, "stable", "tlast changed before tready");
-        check(axis_tuser = tuser, "stable", "tuser changed before tready");
-      end if;
-    end procedure check_stable;
-
-    procedure check_known is
-    begin
-      check(is_known(axis_tvalid), "known", "tvalid is neither '0' nor '1'");
-      check(is_known(axis_tready) or (axis_tvalid = '0' and not IDLE_READY), "known", "tready is neither '0' nor '1'");
-      if axis_tvalid = '1' then
-        check(is_known(axis_tkeep), "known", "a bit of tkeep is neither '0' nor '1'");
-        check(is_known(axis_tlast), "known", "tlast is neither '0' nor '1'");
-        check(not ABORT or is_known(axis_tuser(0)), "known", "tuser(0) is neither '0' nor '1'");
-        for lane in 0 to LANES-1 loop
-          check(axis_tkeep(lane) /= '1' or is_known(axis_tdata(8*lane+7 downto 8*lane)), "known",
-                "a bit of byte " & integer'image(lane) & " is neither '0' nor '1'");
-        end loop;
-      end if;
-    end procedure check_known;
-
-    procedure check_keep is
-    begin
-      check(is_contiguous(axis_tkeep), "keep", "tkeep has a gap");
-      check(axis_tkeep /= NONE or (MAY_BE_EMPTY and axis_tlast = '1'), "keep", "tkeep is empty");
-      check(axis_tkeep = FULL or axis_tlast /= '0' or axis_tkeep = NONE or not is_contiguous(axis_tkeep), "keep",
-            "tkeep is not full before the last beat");
-    end procedure check_keep;
-
-  begin
-    if rising_edge(clk) then
-      if rst_n /= '1' then
-        check(not RESET or not was_reset or axis_tvalid = '0', "reset", "tvalid is not low in reset");
-        is_waiting := false;
-      else
-        if STABLE and is_waiting then
-          check_stable;
-        end if;
-        if KNOWN then
-          check_known;
-        end if;
-        if axis_tvalid = '1' and KEEP and is_known(axis_tkeep) then
-          check_keep;
-        end if;
-        if axis_tvalid = '1' and ABORT then
-          check(axis_tuser(0) /= '1' or axis_tlast /= '0', "abort", "tuser(0) is high before the last beat");
-        end if;
-        is_waiting := axis_tvalid = '1' and axis_tready = '0';
-        tdata      := axis_tdata;
-        tkeep      := axis_tkeep;
-        tuser      := axis_tuser;
-        tlast      := axis_tlast;
-      end if;
-      was_reset := rst_n /= '1';
-    end if;
-  end process watch;
+  check_stream(clk, rst_n, axis_tdata, axis_tkeep, axis_tuser, axis_tvalid, axis_tlast, axis_tready, NAME,
+               LEVEL, RULES);
 
 end architecture simulation;

@@ -5,6 +5,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
+use firm.firm_sim_check_pkg.all;
 
 entity firm_sim_echoes is
   generic (
@@ -102,42 +103,17 @@ begin
   -- The first beat to a subscriber lacks the byte of the id.
   checked_subscribers : for channel in 0 to SUBSCRIBERS-1 generate
     first : if channel < 2 generate
-      u_check_sub : entity firm.firm_axis_checker
-        generic map (
-          WIDTH => WIDTH,
-          NAME  => "to subscriber " & integer'image(channel),
-          LEVEL => failure,
-          KEEP  => WIDTH = 8
-        )
-        port map (
-          clk         => clk,
-          rst_n       => rst_n,
-          axis_tdata  => sub_tdata,
-          axis_tkeep  => sub_tkeep,
-          axis_tvalid => sub_tvalid(channel),
-          axis_tlast  => sub_tlast,
-          axis_tready => taken(channel)
-        );
+      check_stream(clk, rst_n, sub_tdata, sub_tkeep, sub_tvalid(channel), sub_tlast, taken(channel),
+                   "to subscriber " & integer'image(channel),
+                   (keep => WIDTH = 8, may_be_empty => false, abort => false, others => true));
     end generate first;
   end generate checked_subscribers;
 
   checked_publishers : for channel in 0 to PUBLISHERS-1 generate
     first : if channel < 2 generate
-      u_check_pub : entity firm.firm_axis_checker
-        generic map (
-          WIDTH => WIDTH,
-          NAME  => "from publisher " & integer'image(channel),
-          LEVEL => failure
-        )
-        port map (
-          clk         => clk,
-          rst_n       => rst_n,
-          axis_tdata  => tdata((channel+1)*WIDTH-1 downto channel*WIDTH),
-          axis_tkeep  => tkeep((channel+1)*WIDTH/8-1 downto channel*WIDTH/8),
-          axis_tvalid => valid(channel),
-          axis_tlast  => tlast(channel),
-          axis_tready => pub_tready(channel)
-        );
+      check_stream(clk, rst_n, tdata((channel+1)*WIDTH-1 downto channel*WIDTH),
+                   tkeep((channel+1)*WIDTH/8-1 downto channel*WIDTH/8), valid(channel), tlast(channel),
+                   pub_tready(channel), "from publisher " & integer'image(channel));
     end generate first;
   end generate checked_publishers;
 
