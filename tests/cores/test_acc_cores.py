@@ -22,7 +22,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     """The library with the benches, beside `firm` in the same directory."""
     directory = tmp_path_factory.mktemp("acc")
     cores = ("acc/cordic/cordic", "acc/float64/float64")
-    Library("firm", directory).analyse(core_files("axis/package", "sim/checker", "sim/host", *cores))
+    Library("firm", directory).analyse(core_files("axis/package", "sim/checker", "sim/host", "sim/operation", *cores))
     work = Library("work", directory)
     work.analyse([bench for core in cores for bench in sorted((CORES / core).parent.glob("tb/*.vhd"))])
     return work
@@ -65,7 +65,7 @@ def test_cordic(library: Library, tmp_path: Path, width: int, fraction: int, ite
     vectors += [(generator.randint(-limit, limit), generator.randint(-limit, limit)) for _ in range(60)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, width)} {binary(y, width)}\n" for x, y in vectors))
     generics = {"WIDTH": width, "FRACTION": fraction, "ITERATIONS": iterations}
-    run(library, "firm_cordic_vectoring_tb", {**generics, **files(tmp_path, "vectors", "results")})
+    run(library, "firm_cordic_tb", {**generics, **files(tmp_path, "vectors", "results")})
     results = [line.split() for line in (tmp_path / "results.txt").read_text().splitlines()]
     assert len(results) == len(vectors)
 
@@ -89,7 +89,7 @@ def test_vectors_on_the_axes_have_the_same_length_and_exact_angles(library: Libr
     lengths = [*range(1, 41), *(2**61 + beside for beside in (-1, 0, 1))]
     vectors = [vector for n in lengths for vector in ((n, 0), (0, n), (-n, 0), (0, -n))]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, 64)} {binary(y, 64)}\n" for x, y in vectors))
-    run(library, "firm_cordic_vectoring_tb", files(tmp_path, "vectors", "results"))
+    run(library, "firm_cordic_tb", files(tmp_path, "vectors", "results"))
     results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
     half_pi = 2 * round(PI / 4 * 2**60)
     for first, second, third, fourth in zip(*[iter(results)] * 4, strict=True):
@@ -105,7 +105,7 @@ def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Libr
         x, y = generator.randint(1, 2**60), generator.randint(1, 2**60)
         vectors += [(x, y), (-x, y), (-x, -y), (x, -y)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, 64)} {binary(y, 64)}\n" for x, y in vectors))
-    run(library, "firm_cordic_vectoring_tb", files(tmp_path, "vectors", "results"))
+    run(library, "firm_cordic_tb", files(tmp_path, "vectors", "results"))
     results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
     for first, second, third, fourth in zip(*[iter(results)] * 4, strict=True):
         assert len({first[0], second[0], third[0], fourth[0]}) == 1
@@ -127,8 +127,8 @@ def test_sine_and_cosine(library: Library, tmp_path: Path, fraction: int, iterat
     angles += [sign * 13 * unit // 8 + beside for sign in (-1, 1) for beside in (-1, 0, 1)]
     angles += [generator.randint(-4 * unit, 4 * unit - 1) for _ in range(100)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(angle, fraction + 3)}\n" for angle in angles))
-    generics = {"FRACTION": fraction, "ITERATIONS": iterations}
-    run(library, "firm_cordic_sincos_tb", {**generics, **files(tmp_path, "vectors", "results")})
+    generics: dict[str, Generic] = {"OPERATION": "sincos", "FRACTION": fraction, "ITERATIONS": iterations}
+    run(library, "firm_cordic_tb", {**generics, **files(tmp_path, "vectors", "results")})
     results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
     assert len(results) == len(angles)
     # The last rotation is left over; the gain of those that are left out, and the rounding of all, come on top.

@@ -1,19 +1,19 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Feeds an operation from a file and writes its results.
 --
--- As binary digits: a line of VECTORS has the operands, a line of RESULTS has the result. Both sides of the handshake
--- stall at random. The report at the end has the latency of the first operation in cycles and, if nothing stalls, the
--- cycles of all operations. Simulation only.
+-- As binary digits: a line of VECTORS has the operands, with or without blanks between them, a line of RESULTS has the
+-- result. Both sides of the handshake stall at random. The report at the end has the latency of the first operation in
+-- cycles and, if nothing stalls, the cycles of all operations. Simulation only.
 
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.math_real.all;
 
 library std;
 use std.textio.all;
 
 library firm;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_sim_operation is
   generic (
@@ -24,7 +24,9 @@ entity firm_sim_operation is
     -- Widths of the operands and of the result.
     IN_BITS  : positive;
     OUT_BITS : positive;
-    SEED     : positive;
+    -- A result has a blank before as many digits; 0: none.
+    LAST_BITS : natural := 0;
+    SEED      : positive;
     -- Cycles of 100 in which one side of the handshake stalls.
     STALLS   : natural
   );
@@ -67,20 +69,16 @@ begin
     file     vector_file : text open read_mode is VECTORS;
     variable vector      : line;
     variable bits        : bit_vector(IN_BITS-1 downto 0);
-    variable seed_1      : positive := SEED;
-    variable seed_2      : positive := 1;
-    variable chance      : real;
+    variable random      : random_t := seeded(SEED, 1);
   begin
     wait until rising_edge(clk) and rst_n = '1';
     first <= cycle;
     while not endfile(vector_file) loop
       readline(vector_file, vector);
-      read(vector, bits);
-      uniform(seed_1, seed_2, chance);
-      while chance * 100.0 < real(STALLS) loop
-        wait until rising_edge(clk);
-        uniform(seed_1, seed_2, chance);
+      for place in bits'range loop
+        read(vector, bits(place));
       end loop;
+      pause(clk, '1', random, STALLS);
       operands <= to_stdlogicvector(bits);
       in_valid <= '1';
       wait until rising_edge(clk) and in_ready = '1';
@@ -96,22 +94,20 @@ begin
     file     result_file : text open write_mode is RESULTS;
     file     wanted_file : text open read_mode is existing(EXPECTED);
     variable row         : line;
-    variable seed_1      : positive := SEED;
-    variable seed_2      : positive := 2;
-    variable chance      : real;
+    variable random      : random_t := seeded(SEED, 2);
     variable received    : natural := 0;
     variable latency     : natural := 0;
   begin
     wait until rising_edge(clk) and rst_n = '1';
     while not (all_sent and received = sent) loop
-      uniform(seed_1, seed_2, chance);
-      takes <= '1';
-      if chance * 100.0 < real(STALLS) then
-        takes <= '0';
-      end if;
+      draw_ready(random, STALLS, takes);
       wait until rising_edge(clk);
       if out_valid = '1' and takes = '1' then
-        write(row, to_bitvector(result));
+        write(row, to_bitvector(result(OUT_BITS-1 downto LAST_BITS)));
+        if LAST_BITS > 0 then
+          write(row, ' ');
+          write(row, to_bitvector(result(LAST_BITS-1 downto 0)));
+        end if;
         write_result(result_file, wanted_file, EXPECTED, row);
         received := received + 1;
         if received = 1 then
