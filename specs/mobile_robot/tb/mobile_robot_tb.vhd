@@ -122,16 +122,7 @@ begin
       );
   end generate wheels;
 
-  clock : process
-  begin
-    while not is_done loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
+  clk <= not clk after PERIOD / 2 when not is_done else '0';
 
   play : process
     file     scenario_file : text open read_mode is SCENARIO;

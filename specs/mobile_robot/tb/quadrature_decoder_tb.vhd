@@ -48,16 +48,7 @@ begin
       errors => errors
     );
 
-  clock : process
-  begin
-    while not is_done loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
+  clk <= not clk after PERIOD / 2 when not is_done else '0';
 
   -- A sample every 64 cycles; the counts between them are added up.
   play : process

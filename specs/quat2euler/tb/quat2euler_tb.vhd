@@ -135,16 +135,7 @@ begin
 
   in_segment_valid(0) <= in_msg_valid;
 
-  clock : process
-  begin
-    while not finished loop
-      clk <= '0';
-      wait for PERIOD / 2;
-      clk <= '1';
-      wait for PERIOD / 2;
-    end loop;
-    wait;
-  end process clock;
+  clk <= not clk after PERIOD / 2 when not finished else '0';
 
   count : process (clk)
   begin
