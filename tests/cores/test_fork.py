@@ -19,7 +19,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/package", "axis/axis"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host"))
     library.analyse([path for path in core_files("axis/axis", fileset="tb") if path.stem == BENCH])
     return library
 

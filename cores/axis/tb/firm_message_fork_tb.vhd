@@ -3,8 +3,8 @@
 -- be withdrawn, a sink must not wait for another one, and without stalls, a message must pass in every cycle.
 library ieee;
 use ieee.std_logic_1164.all;
-use ieee.math_real.all;
 library firm;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_message_fork_tb is
   generic (
@@ -61,20 +61,12 @@ begin
 
   -- Inputs change shortly after the edge, outputs are read at the next.
   run : process
-    variable seed_1     : positive := SEED;
-    variable seed_2     : positive := SEED + 1;
+    variable random     : random_t := seeded(SEED, SEED + 1);
     variable released   : natural  := 0;
     variable cycles     : natural  := 0;
     variable taken      : count_t(SINKS-1 downto 0) := (others => 0);
     variable was_valid  : std_logic_vector(SINKS-1 downto 0) := (others => '0');
     variable was_ready  : std_logic_vector(SINKS-1 downto 0) := (others => '0');
-
-    procedure draw (percent : integer; happens : out boolean) is
-      variable chance : real;
-    begin
-      uniform(seed_1, seed_2, chance);
-      happens := chance * 100.0 < real(percent);
-    end procedure draw;
 
     variable stalls   : boolean;
     variable is_shown : boolean;
@@ -86,12 +78,12 @@ begin
     while released < MESSAGES loop
       -- An offer remains until it is taken.
       wait for 1 ns;
-      draw(STALL_PERCENT, stalls);
+      draw_chance(random, STALL_PERCENT, stalls);
       if source_valid = '0' and not stalls and not is_over then
         source_valid <= '1';
       end if;
       for segment in source_segment_valid'range loop
-        draw(50, is_shown);
+        draw_chance(random, 50, is_shown);
         source_segment_valid(segment) <= '0';
         if is_shown and not is_over then
           source_segment_valid(segment) <= '1';
@@ -99,7 +91,7 @@ begin
       end loop;
       is_over := false;
       for sink in sink_ready'range loop
-        draw(STALL_PERCENT, stalls);
+        draw_chance(random, STALL_PERCENT, stalls);
         sink_ready(sink) <= '1';
         if stalls or (sink = SINKS-1 and cycles < BLOCKED) then
           sink_ready(sink) <= '0';
@@ -143,14 +135,14 @@ begin
             report "released before sink " & integer'image(sink) & " had it" severity failure;
         end loop;
         source_valid <= '0';
-        draw(STALL_PERCENT, stalls);
+        draw_chance(random, STALL_PERCENT, stalls);
         if not stalls then
           source_valid <= '1' after 1 ns;
         end if;
       elsif source_valid = '1' then
         assert taken /= (taken'range => released + 1)
           report "every sink has the message, but it is not released" severity failure;
-        draw(WITHDRAW_PERCENT, is_over);
+        draw_chance(random, WITHDRAW_PERCENT, is_over);
         if is_over then
           source_valid <= '0' after 1 ns;
           taken        := (others => released);

@@ -7,9 +7,9 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 library firm;
 use firm.firm_sim_check_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_cdc_stream_tb is
   generic (
@@ -174,20 +174,14 @@ begin
   end generate resizer;
 
   send : process
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 5;
-    variable draw     : real;
-    variable place    : natural;
+    variable random : random_t := seeded(SEED, 5);
+    variable place  : natural;
   begin
     wait until s_rst_n = '1';
     for stream in 0 to STREAMS-1 loop
       place := 0;
       while place < length_of(stream) loop
-        uniform(random_1, random_2, draw);
-        while draw * 100.0 < real(STALL_PERCENT) loop
-          wait until rising_edge(s_clk);
-          uniform(random_1, random_2, draw);
-        end loop;
+        pause(s_clk, '1', random, STALL_PERCENT);
         s_tdata <= (others => '0');
         s_tkeep <= (others => '0');
         for lane in 0 to S_LANES-1 loop
@@ -213,9 +207,7 @@ begin
   end process send;
 
   receive : process
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 9;
-    variable draw     : real;
+    variable random   : random_t := seeded(SEED, 9);
     variable place    : natural;
     variable begun    : time;
     variable slower   : time;
@@ -261,11 +253,7 @@ begin
           assert (m_tlast = '1') = (place >= length_of(stream))
             report "tlast of stream " & integer'image(stream) & " is wrong" severity failure;
         end if;
-        uniform(random_1, random_2, draw);
-        m_tready <= '1';
-        if draw * 100.0 < real(STALL_PERCENT) then
-          m_tready <= '0';
-        end if;
+        draw_ready(random, STALL_PERCENT, m_tready);
       end loop;
       received <= stream + 1;
       if stream = 0 and SLACK >= 0 then

@@ -14,10 +14,10 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_dhcp_client_tb is
   generic (
@@ -128,17 +128,15 @@ begin
   end process rest_user;
 
   play : process
-    file rows         : text open read_mode is FRAME_FILE;
-    variable row      : line;
-    variable what     : integer;
-    variable value    : integer;
-    variable aborted  : integer;
-    variable size     : integer;
-    variable before   : natural;
-    variable start    : natural;
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+    file rows        : text open read_mode is FRAME_FILE;
+    variable row     : line;
+    variable what    : integer;
+    variable value   : integer;
+    variable aborted : integer;
+    variable size    : integer;
+    variable before  : natural;
+    variable start   : natural;
+    variable random  : random_t := seeded(SEED, 3);
 
     procedure wait_for(cycles : in natural) is
     begin
@@ -159,11 +157,7 @@ begin
         wait_for(GAP_CYCLES);
         for place in 0 to size-1 loop
           read(row, value);
-          loop
-            uniform(random_1, random_2, draw);
-            exit when 100.0 * draw >= real(SLOW_PERCENT);
-            wait until rising_edge(clk);
-          end loop;
+          pause(clk, '1', random, SLOW_PERCENT);
           if value >= NUMBER+4 then
             value := 255 - xid(value-NUMBER-4);
           elsif value >= NUMBER then

@@ -6,10 +6,10 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
-use ieee.math_real.all;
 use std.textio.all;
 library firm;
 use firm.firm_sim_pkg.all;
+use firm.firm_sim_random_pkg.all;
 
 entity firm_mac_transmitter_tb is
   generic (
@@ -73,20 +73,14 @@ begin
       is_spoiled    => is_spoiled
     );
 
-  step : process (clk)
-    variable random_1 : positive := SEED;
-    variable random_2 : positive := 3;
-    variable draw     : real;
+  stall(clk, SEED, 3, SLOW_PERCENT, tx_step);
+
+  note_step : process (clk)
   begin
     if rising_edge(clk) then
-      uniform(random_1, random_2, draw);
-      tx_step <= '1';
-      if 100.0 * draw < real(SLOW_PERCENT) then
-        tx_step <= '0';
-      end if;
       step_r <= tx_step and rst_n;
     end if;
-  end process step;
+  end process note_step;
 
   send : process
     file frames     : text open read_mode is FRAME_FILE;
@@ -106,8 +100,7 @@ begin
     end procedure wait_for;
 
   begin
-    wait_for(4);
-    rst_n <= '1';
+    end_reset(clk, '1', rst_n);
     while not endfile(frames) loop
       readline(frames, row);
       read(row, before);
