@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections import Counter
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class Report:
             line = {"event": event, "time": round(time.monotonic() - self._started, 3), **facts}
             # A full disk must not end the builds.
             with suppress(OSError):
-                print(json.dumps(line), file=self._events, flush=True)
+                print(json_text(line), file=self._events, flush=True)
 
 
 def junit(rows: Sequence[Row], seconds: float, words: Words) -> str:

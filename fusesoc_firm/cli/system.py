@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -14,6 +13,7 @@ from fusesoc_firm.cli.bring_up import add_bring_up
 from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
 from fusesoc_firm.node.package.languages import LANGUAGES, Place
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
+from fusesoc_firm.text.json_text import json_text
 
 if TYPE_CHECKING:
     from fusesoc_firm.system.system_core import LoadedSystem
@@ -370,8 +370,8 @@ def _print_schema(_: argparse.Namespace) -> None:
     from fusesoc_firm.system.written.specification import Specification
     from fusesoc_firm.text.yaml_schema import json_schema
 
-    print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))
+    _print_json(json_schema(Specification, "System specification of fusesoc_firm"))
 
 
 def _print_json(data: object) -> None:
-    print(json.dumps(data, indent=2, ensure_ascii=False))
+    print(json_text(data, 2))

@@ -28,6 +28,8 @@ from fusesoc_firm.tools.reads import Input, Part
 
 # The hint about additional sources.
 _FURTHER = "; add places with 'paths' in the specification or core, or with --path"
+# The number of unknown messages for which a similar name is searched, which takes tens of milliseconds each.
+_MOST_SEARCHED = 20
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
 
@@ -69,6 +71,8 @@ class MessageLibrary:
         # The definition or None, and the faults in the text, which are reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
+        # The most likely meanings of unknown messages.
+        self._similar: dict[MessageName, str] = {}
         self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
@@ -177,7 +181,7 @@ class MessageLibrary:
         found = {place: interface_files(place, self.ros.suffixes) for place in places}
         # New dictionaries: a copy of this library may share the old ones.
         self._sources, self._interfaces, self._parsed = dict(self._sources), dict(self._interfaces), {}
-        self._extents = {}
+        self._extents, self._similar = {}, {}
         self._messages = self._messages | {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
         bags = {place: self._bag(place, paths[place], faults) for place in paths if not any(found[place].values())}
         faults.raise_if_any()
@@ -284,7 +288,9 @@ class MessageLibrary:
         places = ", ".join([*map(str, self._places), self._store.title])
         if feature := unsupported_word(name.name):
             return f"looked in: {places}; {feature.fault}: {feature.hint}"
-        nearest = self._nearest(name)
+        if name not in self._similar and len(self._similar) < _MOST_SEARCHED:
+            self._similar[name] = self._nearest(name)
+        nearest = self._similar.get(name)
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
-
-import yaml
 
 from fusesoc_firm.scheduling.analysis import Analysis, Choice, end_of
 from fusesoc_firm.scheduling.tables import UNKNOWN, grid
+from fusesoc_firm.text.json_text import json_text
+from fusesoc_firm.text.yaml_text import yaml_dump
 
 
 def show(choice: Choice, form: str) -> str:
@@ -17,8 +16,8 @@ def show(choice: Choice, form: str) -> str:
         return _text(choice)
     data = as_data(choice)
     if form == "json":
-        return json.dumps(data, indent=1) + "\n"
-    return yaml.safe_dump(data, sort_keys=False, width=120)
+        return json_text(data, 1) + "\n"
+    return yaml_dump(data)
 
 
 def as_data(choice: Choice) -> dict[str, Any]:

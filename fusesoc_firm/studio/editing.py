@@ -14,6 +14,7 @@ from fusesoc_firm.studio.requests import Requests, body_of, in_json
 from fusesoc_firm.studio.scene import content_of, grammar, outline, scene
 from fusesoc_firm.studio.workspace import MOST_NAMES, Workspace, with_words
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.json_text import json_text
 
 # The seconds between two checks of the opened files for changes.
 _LOOK = 0.3
@@ -85,7 +86,7 @@ class Editing:
         try:
             diagnostics = self._workspace.tools.check(self._workspace.loaded(document), document.path)
         except InputError as error:
-            diagnostics = error.diagnostics
+            diagnostics = error.shown()
         return [item.data() for item in diagnostics]
 
     async def _answer(self, document: Document, unsaved: str | None = None) -> web.Response:
@@ -157,4 +158,4 @@ class Editing:
     async def _tell(self, event: dict[str, Any]) -> None:
         for socket in [*self._listeners]:
             with suppress(ConnectionError):
-                await socket.send_json(event)
+                await socket.send_json(event, dumps=json_text)

@@ -14,6 +14,7 @@ from fusesoc_firm.studio.resources import resources_of
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.json_text import json_text
 
 
 class Evaluation:
@@ -53,7 +54,7 @@ class Evaluation:
 
     async def _synthesise(self, document: Document, socket: web.WebSocketResponse) -> None:
         async def tell(news: dict[str, Any]) -> None:
-            await socket.send_json(news)
+            await socket.send_json(news, dumps=json_text)
 
         async with self._turn:
             try:

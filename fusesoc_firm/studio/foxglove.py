@@ -22,6 +22,7 @@ from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.joint import joint_text
 from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.system.derived.model import absolute_name
+from fusesoc_firm.text.json_text import json_text
 
 FOXGLOVE = "foxglove"
 """The last part of the address."""
@@ -56,7 +57,7 @@ async def serve_foxglove(socket: web.WebSocketResponse, current: Callable[[], Ru
         async for message in socket:
             if message.type != WSMsgType.TEXT:
                 continue
-            with suppress(json.JSONDecodeError, RecursionError, TypeError, KeyError):
+            with suppress(ValueError, OverflowError, RecursionError, TypeError, KeyError):
                 _take(client, json.loads(message.data))
     finally:
         sender.cancel()
@@ -107,7 +108,7 @@ async def _advertise(client: _Client, run: Run) -> None:
     client.subscriptions.clear()
     client.channels = {block: next(client.numbers) for block in run.topics}
     channels = [_channel(run, block, number) for block, number in client.channels.items()]
-    await client.socket.send_json({"op": "advertise", "channels": channels})
+    await client.socket.send_json({"op": "advertise", "channels": channels}, dumps=json_text)
 
 
 def _channel(run: Run, block: str, number: int) -> dict[str, object]:

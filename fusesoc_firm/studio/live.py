@@ -7,7 +7,6 @@ slow the run. A slow page receives fewer reports; the run never waits for it.
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -25,6 +24,7 @@ from fusesoc_firm.studio.reports import Reports, row
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
+from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.tools.simulators import fitting
 
 # The time between two reports, and the largest number of unconfirmed reports.
@@ -41,8 +41,6 @@ LATENCY, BYTES = "latency", "bytes"
 _MOST_RATE = 100_000
 # The legal texts from a page: the number of reports displayed since its last confirmation.
 _SHOWN = {str(count) for count in range(1, _MOST_AHEAD + 1)}
-# Reports contain no circular references.
-_IN_JSON = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
 _CONTROLS = ("pause", "resume", "step", "stop")
 
 
@@ -134,7 +132,7 @@ class Live:
             await ahead.acquire()
             while (report := reports.next(self.run, self._count, self._file)) is None:
                 await asyncio.sleep(_SECONDS)
-            await socket.send_json(report, dumps=_IN_JSON)
+            await socket.send_json(report, dumps=json_text)
             # Sleep until the next multiple of the period, so that delays do not accumulate.
             await asyncio.sleep(_SECONDS - now() % _SECONDS)
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from aiohttp import web
 
+from fusesoc_firm.text.json_text import json_text
+
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 Requests = dict[str, Handler]
 """Handlers by method and name, such as `GET scene`."""
@@ -17,7 +19,10 @@ async def body_of(request: web.Request) -> dict[str, Any]:
     """Return the mapping that a request sends; raise 400 for anything else."""
     try:
         body = await request.json()
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
+        # No file can contain a lone surrogate, which JSON's escapes can express.
+        json.dumps(body, ensure_ascii=False).encode()
+    # Python also refuses to read or print a number of thousands of digits.
+    except (ValueError, RecursionError):
         body = None
     if not isinstance(body, dict):
         raise web.HTTPBadRequest(reason="the request is not a mapping in JSON")
@@ -34,5 +39,4 @@ def number_of(request: web.Request, name: str) -> int:
 
 def in_json(data: object, status: int = 200) -> web.Response:
     """Return an answer in JSON."""
-    # YAML has values, such as dates, that JSON lacks.
-    return web.json_response(data, status=status, dumps=lambda value: json.dumps(value, default=str))
+    return web.json_response(data, status=status, dumps=json_text)

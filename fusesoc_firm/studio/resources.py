@@ -23,13 +23,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fusesoc_firm.core.core_reader import CoreFile
 from fusesoc_firm.node.transport.built_simulator import fusesoc_run, project_folder
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.files import write_whole
+from fusesoc_firm.text.yaml_text import data_in
 from fusesoc_firm.tools import own_code
 from fusesoc_firm.tools.digests import default_root
 from fusesoc_firm.tools.programs import facts_of, find, missing, ways
@@ -108,7 +107,7 @@ async def _netlist(spec: Path, core: CoreFile, folder: Path) -> tuple[Path, str]
     (request,) = folder.glob("*.ghdlsynth")
     await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
     (description,) = folder.glob("*.eda.yml")
-    top = yaml.safe_load(description.read_text(encoding="utf-8"))["toplevel"]
+    top = data_in(description)["toplevel"]
     return folder / f"{request.stem}_netlist.v", str(top)
 
 

@@ -37,7 +37,7 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
         diagnostics = loaded.warnings
         derived = derived_description(loaded.system)
     except InputError as error:
-        diagnostics = error.diagnostics
+        diagnostics = error.shown()
     read = _read(text)
     root = read.root if read else None
     faults = [_fault(root, file, item) for item in diagnostics]

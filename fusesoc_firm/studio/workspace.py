@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ParamSpec, TypeVar
@@ -17,12 +17,16 @@ from fusesoc_firm.studio.page_run import Build
 from fusesoc_firm.studio.scene import content_of
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostic
-from fusesoc_firm.text.files import is_file
+from fusesoc_firm.text.files import is_file, read_regular
 from fusesoc_firm.text.yaml_text import SMALL
 
 # The endings of specifications' names, and folders without specifications.
 _SUFFIXES = (".yaml", ".yml")
 _NO_SOURCES = ("build", "node_modules")
+# The keys by which a specification is recognised, and the maximum number of characters with a different layout.
+_KEYS = ("project", "blocks")
+_KEY_LINE = re.compile(r"""^["']?(project|blocks)["']?[ \t]*:(?:\s|$)""", re.MULTILINE)
+_MOST_PARSED = 2**14
 # The largest number of messages in an answer to a search.
 MOST_NAMES = 50
 
@@ -121,12 +125,13 @@ def with_words(names: Iterable[str], query: str) -> list[str]:
     return [name for name in names if all(word in name.lower() for word in words)]
 
 
-def _text(path: Path) -> str:
-    with suppress(OSError, UnicodeDecodeError):
-        if path.stat().st_size <= SMALL.bytes:
-            return path.read_text(encoding="utf-8")
-    return ""
-
-
 def _is_specification(path: Path) -> bool:
-    return {"project", "blocks"} <= (content_of(_text(path)) or {}).keys()
+    """Return whether a file has a specification's keys; it need not be valid."""
+    try:
+        text = read_regular(path, SMALL.bytes).decode(errors="replace")
+    except OSError:
+        return False
+    if not all(key in text for key in _KEYS):
+        return False
+    # Most files have a key on each line, so that no parser is needed, which may take seconds.
+    return set(_KEYS) <= {*_KEY_LINE.findall(text)} or set(_KEYS) <= (content_of(text[:_MOST_PARSED]) or {}).keys()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -91,10 +91,16 @@ class InputError(Exception):
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        lines = [str(diagnostic) for diagnostic in self.diagnostics[:_MOST_SHOWN]]
-        if len(self.diagnostics) > _MOST_SHOWN:
-            lines.append(f"and {len(self.diagnostics) - _MOST_SHOWN} more")
-        super().__init__("\n".join(lines))
+        lines = map(str, self.diagnostics[:_MOST_SHOWN])
+        super().__init__("\n".join([*lines, *([self._rest()] if self._rest() else [])]))
+
+    def shown(self) -> Sequence[Diagnostic]:
+        """Return the faults to show, the last of which may be the number of further ones."""
+        rest = [Diagnostic(self._rest())] if self._rest() else []
+        return *self.diagnostics[:_MOST_SHOWN], *rest
+
+    def _rest(self) -> str:
+        return f"and {len(self.diagnostics) - _MOST_SHOWN} more" if len(self.diagnostics) > _MOST_SHOWN else ""
 
 
 @dataclass

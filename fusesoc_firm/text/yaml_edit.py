@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import re
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
@@ -74,6 +75,11 @@ def remove(text: str, path: Path) -> str:
     return source.changed(source.remove(path), expected)
 
 
+def document(data: Mapping[str, Any]) -> str:
+    """Return the text of a new file, with one line per key and per item of a list of mappings."""
+    return "".join(f"{line}\n" for key, value in data.items() for line in _key_lines(key, value, 0, _Style()))
+
+
 def word(answer: str) -> str:
     """Return a text as a scalar, in quotes if YAML would otherwise misread it, alone or in a list."""
     if is_number(answer):
@@ -88,19 +94,21 @@ def word(answer: str) -> str:
 
 def path_at(node: yaml.Node | None, line: int, column: int) -> list[str | int]:
     """Return the path, below a file's root, of the last value that starts at or before a place, counted from 1."""
-    place = (line - 1, column - 1)
     found: list[str | int] = []
     while isinstance(node, yaml.CollectionNode):
-        child = None
-        for number, item in enumerate(node.value):
-            key, value = item if isinstance(item, tuple) else (item, item)
-            if (key.start_mark.line, key.start_mark.column) <= place:
-                child = (number if value is key else str(key.value), value)
-        if child is None:
+        number = bisect_right(node.value, (line - 1, column - 1), key=_start) - 1
+        if number < 0:
             break
-        found.append(child[0])
-        node = child[1]
+        item = node.value[number]
+        part, node = (str(item[0].value), item[1]) if isinstance(item, tuple) else (number, item)
+        found.append(part)
     return found
+
+
+def _start(item: yaml.Node | tuple[yaml.Node, yaml.Node]) -> tuple[int, int]:
+    """Return the place of a key or of a list's item."""
+    mark = (item[0] if isinstance(item, tuple) else item).start_mark
+    return mark.line, mark.column
 
 
 def is_number(answer: str) -> bool:
@@ -172,6 +180,8 @@ class _Source:
         ends = list(LINE_END.finditer(text))
         self._starts = [0, *(end.end() for end in ends)]
         self._line_end = ends[0].group() if ends else "\n"
+        # New lists are indented like the first list of the file.
+        self._style = next(_styles(self._root), _Style())
 
     def data(self) -> Any:
         """Return the data in the text. Raise `EditError` for invalid values."""
@@ -242,7 +252,7 @@ class _Source:
             yield _Change(start, end, empty)
             return
         key = next(key for key, _ in above.value if key.value == path[-1])
-        colon = self._text.index(":", self._place(key.end_mark)) + 1
+        colon = self._text.index(":", key.end_mark.index) + 1
         yield _Change(colon, colon, f" {empty}")
         yield self._lines(start, end)
 
@@ -259,7 +269,7 @@ class _Source:
             yield self._insert_between(parent, min(index, len(names)), f"{name}: {_flow(value)}")
         else:
             end = self._parts(parent)[index - 1][1]
-            yield self._new_lines(end, self._key_lines(name, value, parent.start_mark.column))
+            yield self._new_lines(end, _key_lines(name, value, parent.start_mark.column, self._style))
 
     def _remove_key(self, parent: yaml.Node, parts: Sequence[tuple[int, int]], index: int) -> _Change:
         start, end = parts[index]
@@ -271,7 +281,7 @@ class _Source:
         return self._lines(start, end)
 
     def _replace_nothing(self, old: yaml.Node, value: Any) -> Iterator[_Change]:
-        place = self._place(old.start_mark)
+        place = old.start_mark.index
         yield _Change(place, place, ("" if self._text[place - 1 : place] == " " else " ") + _flow(value))
 
     # --- lists -----------------------------------------------------------------------------------------------------
@@ -308,7 +318,7 @@ class _Source:
         """Return the change for a further item in brackets."""
         parts = self._parts(node)
         if not parts:
-            place = self._place(node.start_mark) + 1
+            place = node.start_mark.index + 1
             return _Change(place, place, new)
         if index < len(parts):
             place = parts[index][0]
@@ -340,28 +350,11 @@ class _Source:
 
     # --- new lines -------------------------------------------------------------------------------------------------
 
-    def _key_lines(self, name: str, value: Any, column: int) -> list[str]:
-        """Return the lines of a key, which begins at a column."""
-        indent = " " * column
-        if isinstance(value, Mapping):
-            lines = [line for key, item in value.items() for line in self._key_lines(str(key), item, column + 2)]
-            return [f"{indent}{word(name)}:", *lines]
-        if isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
-            lines = [line for item in value for line in self._item_lines(item, column + self._offset())]
-            return [f"{indent}{word(name)}:", *lines]
-        return [f"{indent}{word(name)}: {_flow(value)}"]
-
-    def _item_lines(self, value: Any, column: int) -> list[str]:
-        """Return the lines of a list's item, whose dash is at a column."""
-        indent = " " * column
-        if not isinstance(value, Mapping) or not value:
-            return [f"{indent}- {_flow(value)}"]
-        lines = [line for key, item in value.items() for line in self._key_lines(str(key), item, column + 2)]
-        return [f"{indent}- {lines[0].lstrip()}", *lines[1:]]
-
     def _items_lines(self, node: yaml.CollectionNode, values: Sequence[Any]) -> list[str]:
         """Return the lines of further items of a list."""
-        return [line for value in values for line in self._item_lines(value, node.start_mark.column)]
+        column = node.start_mark.column
+        gap = _gap(node) or self._style.gap
+        return [line for value in values for line in _item_lines(value, column, replace(self._style, gap=gap))]
 
     def _whole(self, lines: Sequence[str]) -> str:
         return "".join(line + self._line_end for line in lines)
@@ -372,10 +365,6 @@ class _Source:
         is_ended = place > 0 and LINE_END.fullmatch(self._text[place - 1]) is not None
         added = self._line_end.join(lines)
         return _Change(place, place, added + self._line_end if is_ended else self._line_end + added)
-
-    def _offset(self) -> int:
-        """Return the number of blanks before a dash below its key, as in the first list of the file."""
-        return next(_offsets(self._root), 2)
 
     # --- places ----------------------------------------------------------------------------------------------------
 
@@ -396,32 +385,29 @@ class _Source:
     def _parts(self, node: yaml.Node) -> list[tuple[int, int]]:
         """Return the start and end of each key with its value, or of each item."""
         if isinstance(node, yaml.MappingNode):
-            return [(self._place(key.start_mark), self._end(key, value)) for key, value in node.value]
+            return [(key.start_mark.index, self._end(key, value)) for key, value in node.value]
         return [self._extent(item) for item in node.value]
 
     def _end(self, key: yaml.Node, value: yaml.Node) -> int:
-        return max(self._place(key.end_mark), self._extent(value)[1])
+        return max(key.end_mark.index, self._extent(value)[1])
 
     def _extent(self, node: yaml.Node) -> tuple[int, int]:
         """Return the start and end of a node, without the comments after it."""
-        start = self._place(node.start_mark)
+        start = node.start_mark.index
         if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
             last = node.value[-1]
             return start, self._end(*last) if isinstance(last, tuple) else self._extent(last)[1]
-        end = self._place(node.end_mark)
+        end = node.end_mark.index
         if isinstance(node, yaml.ScalarNode) and node.style in ("|", ">"):
             end = start + len(self._text[start:end].rstrip())
         return start, end
 
-    def _place(self, mark: yaml.Mark) -> int:
-        place: int = self._starts[mark.line] + mark.column
-        return place
-
     def _line_start(self, place: int) -> int:
-        return max(start for start in self._starts if start <= place)
+        return self._starts[bisect_right(self._starts, place) - 1]
 
     def _next_line(self, place: int) -> int:
-        return min((start for start in self._starts if start > place), default=len(self._text))
+        number = bisect_right(self._starts, place)
+        return self._starts[number] if number < len(self._starts) else len(self._text)
 
     def _lines(self, start: int, end: int) -> _Change:
         """Return the change that removes all lines from `start` to `end`."""
@@ -460,13 +446,43 @@ def _quoted(text: str, style: str) -> str:
     return json.dumps(text, ensure_ascii=False) if text.isprintable() else json.dumps(text)
 
 
-def _offsets(node: yaml.Node) -> Iterator[int]:
-    """Yield the indentation of each list below its key."""
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            if isinstance(value, yaml.SequenceNode) and not value.flow_style and value.value:
-                yield value.start_mark.column - key.start_mark.column
-            yield from _offsets(value)
-    elif isinstance(node, yaml.SequenceNode):
-        for item in node.value:
-            yield from _offsets(item)
+@dataclass(frozen=True)
+class _Style:
+    """The number of blanks before the dash of a list's item, relative to the list's key, and after the dash."""
+
+    offset: int = 2
+    gap: int = 1
+
+
+def _styles(node: yaml.Node) -> Iterator[_Style]:
+    """Yield the style of each list below a key."""
+    for item in node.value if isinstance(node, yaml.CollectionNode) else ():
+        key, value = item if isinstance(item, tuple) else (None, item)
+        if key and isinstance(value, yaml.SequenceNode) and not value.flow_style and value.value:
+            yield _Style(value.start_mark.column - key.start_mark.column, _gap(value) or 1)
+        yield from _styles(value)
+
+
+def _gap(node: yaml.CollectionNode) -> int:
+    """Return the number of blanks after the dash of a list's first item, or 0 if the item is on another line."""
+    first = node.value[0].start_mark
+    return int(first.column - node.start_mark.column - 1) if first.line == node.start_mark.line else 0
+
+
+def _key_lines(name: str, value: Any, column: int, style: _Style) -> list[str]:
+    """Return the lines of a key, which begins at a column."""
+    lines: list[str] = []
+    if isinstance(value, Mapping):
+        lines = [line for key, item in value.items() for line in _key_lines(str(key), item, column + 2, style)]
+    elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+        lines = [line for item in value for line in _item_lines(item, column + style.offset, style)]
+    return [f"{' ' * column}{word(name)}:{'' if lines else f' {_flow(value)}'}", *lines]
+
+
+def _item_lines(value: Any, column: int, style: _Style) -> list[str]:
+    """Return the lines of a list's item, whose dash is at a column."""
+    dash = f"{' ' * column}-{' ' * style.gap}"
+    if not isinstance(value, Mapping) or not value:
+        return [dash + _flow(value)]
+    lines = [line for key, item in value.items() for line in _key_lines(str(key), item, len(dash), style)]
+    return [dash + lines[0].lstrip(), *lines[1:]]

@@ -75,13 +75,18 @@ def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
     return dataclasses.field(default=default, metadata={"key": made})
 
 
-def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
+_KEYS: dict[type[Section], Mapping[str, tuple[str, Key]]] = {}
+
+
+def keys_of(section: type[Section]) -> Mapping[str, tuple[str, Key]]:
     """Return the field name and `Key` for each key's name in the file, in the grammar's order."""
-    return {
-        (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
-        for field in dataclasses.fields(section)
-        if "key" in field.metadata
-    }
+    if section not in _KEYS:
+        _KEYS[section] = {
+            (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
+            for field in dataclasses.fields(section)
+            if "key" in field.metadata
+        }
+    return _KEYS[section]
 
 
 def keys_only_of(section: type[Section], kind: str) -> list[str]:
@@ -122,7 +127,7 @@ class _Reader:
         places = {known[name][0]: self.file.source(value) for name, value in given.items()}
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
-    def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
+    def _given(self, known: Mapping[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
         """Return the value nodes of the known keys that have a value, by the keys' main names."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}

@@ -2,8 +2,9 @@
 
 The marks in PyYAML's nodes become `SourceRef`s, and values keep their places; a `Text` is a string with a place.
 
-The numbers of bytes, levels and nodes in a file are limited before any value is built, since a few lines of aliases can
-expand to more than the available memory.
+All YAML is composed here. The numbers of bytes, levels and nodes in a file are limited before any value is built, since
+a few lines of aliases can expand to more than the available memory. An alias inside its own value is invalid, so data
+are trees.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +24,16 @@ from fusesoc_firm.text.files import read_regular
 
 MOST_LEVELS = 64
 LONGEST_NUMBER = 40
-"""The maximum number of characters in a number; Python itself raises `ValueError` beyond thousands of digits."""
+"""The maximum number of characters in a number of a specification."""
+# The maximum in other data. Python prints at most 4300 digits, and converts a long number to base 60 in quadratic time.
+_LONGEST_INTEGER = 1000
+# The maximum number of characters in an invalid text for which PyYAML's slow parser finds a more exact message.
+_MOST_REPARSED = 2**17
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
+_SURROGATE = re.compile("[\ud800-\udfff]")
+_MOST_CONTROL_CHARACTERS = 200
 # The errors that PyYAML reports for a line whose indentation does not match any line above.
 _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
 # A block begins with the dash of a list's item, or with the first word of a line that is not a comment.
@@ -56,6 +64,14 @@ class TooLargeError(Exception):
         self.mark = mark
 
 
+@dataclass(frozen=True)
+class _Size:
+    """The number of nodes and of levels under an anchor."""
+
+    nodes: int
+    levels: int
+
+
 class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
     """A composer of nodes from a parser's events, which raises `TooLargeError` at the first node beyond the limits."""
 
@@ -64,23 +80,54 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
         yaml.resolver.Resolver.__init__(self)
         self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
         self._bounds = bounds
-        self._nodes = self._level = 0
-        # The number of nodes under each anchor.
-        self._sizes: dict[str, int] = {}
+        self._nodes = self._level = self._deepest = 0
+        # The sizes of the anchors whose values are complete.
+        self._sizes: dict[str, _Size] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        event, before = self.peek_event(), self._nodes
-        self._nodes += self._sizes.get(event.anchor or "", 1) if isinstance(event, yaml.AliasEvent) else 1
-        self._level += 1
-        if self._level > MOST_LEVELS:
+        event, nodes, deepest = self.peek_event(), self._nodes, self._deepest
+        is_alias, anchor = isinstance(event, yaml.AliasEvent), event.anchor or ""
+        size = self._alias_size(anchor, event.start_mark) if is_alias else _Size(1, 1)
+        self._nodes += size.nodes
+        self._deepest = self._level + size.levels
+        if self._deepest > MOST_LEVELS:
             raise TooLargeError(f"{MOST_LEVELS} levels", event.start_mark)
         if self._nodes > self._bounds.nodes:
             raise TooLargeError(f"{self._bounds.nodes} values", event.start_mark)
+        self._level += 1
         node: yaml.Node | None = super().compose_node(parent, index)
         self._level -= 1
-        if event.anchor and not isinstance(event, yaml.AliasEvent):
-            self._sizes[event.anchor] = self._nodes - before
+        if anchor and not is_alias:
+            self._sizes[anchor] = _Size(self._nodes - nodes, self._deepest - self._level)
+        self._deepest = max(deepest, self._deepest)
         return node
+
+    def compose_scalar_node(self, anchor: Any) -> yaml.ScalarNode:
+        node = super().compose_scalar_node(anchor)
+        if not node.value.isascii() and (found := _SURROGATE.search(node.value)):
+            problem = f"\\u{ord(found[0]):04x} is half of a character"
+            raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
+        return node
+
+    def _alias_size(self, anchor: str, mark: Any) -> _Size:
+        """Return the size of an alias' value, which has to be complete."""
+        if anchor in self.anchors and anchor not in self._sizes:
+            raise yaml.composer.ComposerError(None, None, f"the alias '*{anchor}' is inside its own value", mark)
+        return self._sizes.get(anchor, _Size(1, 1))
+
+
+class _Constructor(yaml.SafeLoader):
+    """A constructor of data, which limits the time that an integer takes."""
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        if len(node.value) > _LONGEST_INTEGER:
+            problem = f"the number has more than {_LONGEST_INTEGER} characters"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+        value: int = super().construct_yaml_int(node)
+        return value
+
+
+_Constructor.add_constructor("tag:yaml.org,2002:int", _Constructor.construct_yaml_int)
 
 
 class Text(str):
@@ -160,11 +207,12 @@ def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL
 
 
 def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
-    for number, line in enumerate(LINE_END.split(text)):
-        for found in _CONTROL_CHARACTERS.finditer(line):
-            shown = _CONTROL_CHARACTERS.sub("?", line)
-            message = f"invalid YAML: it contains the control character 0x{ord(found.group()):02x}"
-            faults.error(message, SourceRef(file, number + 1, found.start() + 1, shown))
+    """Report the first control character of each line."""
+    lines = ((number, line, _CONTROL_CHARACTERS.search(line)) for number, line in enumerate(LINE_END.split(text), 1))
+    for number, line, found in islice((item for item in lines if item[2]), _MOST_CONTROL_CHARACTERS):
+        assert found
+        message = f"invalid YAML: it contains the control character 0x{ord(found[0]):02x}"
+        faults.error(message, SourceRef(file, number, found.start() + 1, _CONTROL_CHARACTERS.sub("?", line)))
 
 
 def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...], faults: Diagnostics) -> None:
@@ -216,9 +264,12 @@ def _block_begins(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
-    """Return the root node of a text. Raise `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
-    with suppress(yaml.YAMLError):
+    """Return the root node of a text. Raise `yaml.MarkedYAMLError`, if possible with the message of PyYAML's parser."""
+    try:
         return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
+    except yaml.YAMLError:
+        if len(text) > _MOST_REPARSED:
+            raise
     return _composed_by(yaml.SafeLoader, text, bounds)
 
 
@@ -259,12 +310,17 @@ def yaml_data(text: str) -> Any:
         raise yaml.YAMLError(str(error)) from error
 
 
+def data_in(path: Path) -> Any:
+    """Return the data in a file. Raise `OSError`, `UnicodeDecodeError`, or `yaml.YAMLError` for invalid values."""
+    return yaml_data(read_regular(path, LARGE.bytes).decode("utf-8-sig"))
+
+
 def data_of(root: yaml.Node | None) -> Any:
     """Return the data in a node and its children. Raise `yaml.YAMLError` for invalid values."""
     try:
-        return None if root is None else yaml.SafeLoader("").construct_document(root)
-    except (ValueError, TypeError, LookupError, OverflowError) as error:
-        # Causes include a number without digits or with thousands of digits, an invalid date, and a list as a key.
+        return None if root is None else _Constructor("").construct_document(root)
+    except (ValueError, TypeError, LookupError, OverflowError, AttributeError) as error:
+        # Causes include a number without digits, an invalid date, a tag that does not fit, and a list as a key.
         raise yaml.YAMLError(str(error)) from error
 
 

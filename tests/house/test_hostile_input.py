@@ -247,7 +247,10 @@ _NINE_TIMES = "".join(f"{name}: &{name} [{', '.join([f'*{above}'] * 9)}]\n" for 
         ("blocks:\n" + "- {name: b}\n" * 100_000, "spec.yaml: it is larger than 1048576 bytes"),
         ("blocks:\n" + "- a\n" * 100_000, "spec.yaml:49999:3: error: the file is too large: more than 50000 values"),
         ("a: &a [x, x, x, x, x, x, x, x, x]\n" + _NINE_TIMES, "the file is too large: more than 50000 values"),
-        ("&a {project: *a, blocks: [*a]}", "'project' needs the key 'name'"),
+        (
+            "&a {project: *a, blocks: [*a]}",
+            "spec.yaml:1:14: error: invalid YAML: the alias '*a' is inside its own value",
+        ),
     ],
 )
 def test_yaml_is_bounded(text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

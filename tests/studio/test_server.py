@@ -227,11 +227,14 @@ def test_a_request_without_the_secret_is_refused(studio: Studio, secret: str, pa
         (b"[1]", "application/json", 400),
         (b"\xff\xfe", "application/json", 400),
         (b"[" * 100_000, "application/json", 400),
+        (b'{"file": "arm/arm.yaml", "version": ' + b"9" * 5000 + b"}", "application/json", 400),
+        (b'{"file": "arm/arm.yaml\\ud800"}', "application/json", 400),
+        (b'{"file": "arm/arm.yaml", "text": "\\udc00"}', "application/json", 400),
         (b"{}", "text/plain", 415),
         (b"file=arm", "application/x-www-form-urlencoded", 415),
         (b" " * 5_000_000, "application/json", 413),
     ],
-    ids=range(7),
+    ids=range(10),
 )
 def test_a_request_of_another_form_is_refused(studio: Studio, body: bytes, kind: str, status: int) -> None:
     assert ask(studio, "POST", "api/edit", body, Content_Type=kind)[0] == status
@@ -258,6 +261,47 @@ def test_the_first_scene_is_named_by_the_page(studio: Studio, folder: Path) -> N
     assert whole["derived"]
     (folder / "arm" / "arm.yaml").unlink()
     assert ask(studio, "GET", "api/outline")[2] is None
+
+
+HOSTILE = {
+    "cycle": "project: {name: a}\nblocks: &b [*b]\n",
+    "cycle_top": "a: &a [*a]\nproject: {name: a}\nblocks: []\n",
+    "nan": "project: {name: a, width: .nan}\nblocks: [-.inf]\n",
+    "keys": "project: {name: a, 2026-01-01: b, .nan: c, 1: d}\nblocks: []\n",
+    "tags": "project: {name: !!binary YQ==}\nblocks: !!set {a, b}\n",
+    "surrogate": 'project: {name: "\\ud800"}\nblocks: []\n',
+    "digits": f"project: {{name: a, width: 0x{'f' * 50_000}}}\nblocks: []\n",
+    "base_60": f"project: {{name: a, width: 1{':1' * 400_000}}}\nblocks: []\n",
+    "deep": f"project: {{name: a}}\nblocks: {'[' * 100_000}\n",
+    "control": "project: {name: a}\nblocks: []\n" + "\0" * 300_000,
+    "open": "project: {name: a}\nblocks: [" + "x, " * 40_000,
+    "laughs": "project: {name: a}\na0: &a0 [x]\n"
+    + "".join(f"a{n}: &a{n} [{f'*a{n - 1}, ' * 9}]\n" for n in range(1, 12))
+    + "blocks: *a11\n",
+}
+
+
+def test_hostile_files_do_not_hide_the_others(studio: Studio, folder: Path) -> None:
+    """All files are listed, each has a scene of valid JSON with its faults, and the others have all their facts."""
+    for number in range(len(HOSTILE), 200):
+        (folder / f"more{number}.yaml").write_text([*HOSTILE.values()][number % 6], encoding="utf-8")
+    for name, text in HOSTILE.items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    files = ask(studio, "GET", "api/files")[2]["files"]
+    assert len(files) == 201 and {"arm/arm.yaml", *(f"{name}.yaml" for name in HOSTILE)} <= {*files}
+    assert ask(studio, "GET", "api/outline")[0] == 200
+    for name in HOSTILE:
+        found = scene(studio, f"{name}.yaml")
+        assert found["derived"] is None and found["faults"]
+    whole = scene(studio)
+    assert whole["derived"] and not whole["faults"]
+
+
+def test_more_faults_than_can_be_read_are_counted(studio: Studio, folder: Path) -> None:
+    (folder / "many.yaml").write_text("project: {name: a}\nblocks:\n" + "  - x\n" * 300, encoding="utf-8")
+    faults = scene(studio, "many.yaml")["faults"]
+    assert len(faults) == 201
+    assert faults[-1]["message"].startswith("and ")
 
 
 def test_one_specification_can_be_served_alone(folder: Path) -> None:

@@ -8,7 +8,17 @@ import pytest
 import yaml
 
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
-from fusesoc_firm.text.yaml_text import Text, YamlText, is_null, items, kind, parse_yaml, read_yaml
+from fusesoc_firm.text.yaml_text import (
+    MOST_LEVELS,
+    Text,
+    YamlText,
+    is_null,
+    items,
+    kind,
+    parse_yaml,
+    read_yaml,
+    yaml_data,
+)
 
 
 def parse(text: str) -> tuple[YamlText, str]:
@@ -80,6 +90,10 @@ def test_items_come_once() -> None:
         ("a: b\nc d\ne: f\n", ["a.yaml:2:1: error: invalid YAML: could not find expected ':'"]),
         ("a: *b\n", ["a.yaml:1:4: error: invalid YAML: found undefined alias 'b'"]),
         ("a: b\n---\nc: d\n", ["a.yaml:2:1: error: invalid YAML: but found another document"]),
+        ("a: &b [*b]", ["a.yaml:1:8: error: invalid YAML: the alias '*b' is inside its own value"]),
+        ("&a\nb: {c: *a}", ["a.yaml:2:8: error: invalid YAML: the alias '*a' is inside its own value"]),
+        ('a: "b\\udc00"', ["a.yaml:1:4: error: invalid YAML: \\udc00 is half of a character"]),
+        ("a: \x01\x02", ["a.yaml:1:4: error: invalid YAML: it contains the control character 0x01"]),
         ("a: @b", ["a.yaml:1:4: error: invalid YAML: found character '@' that cannot start any token"]),
         (
             "a: b\x01\nc: \x00[\n",
@@ -163,3 +177,33 @@ def test_a_file_that_cannot_be_read(tmp_path: Path, content: bytes | None, messa
     with pytest.raises(InputError) as raised:
         read_yaml(path, "a.yaml")
     assert str(raised.value).startswith(message)
+
+
+def test_the_levels_below_an_alias_count() -> None:
+    """Data of any depth could otherwise be written with few levels in the text."""
+    levels = MOST_LEVELS // 2
+    text = f"a: &a {'[' * levels}{']' * levels}\nb: {'[' * levels}*a{']' * levels}\n"
+    with pytest.raises(InputError, match=f"a.yaml:2:{levels + 4}: error: the file is too large: more than 64 levels"):
+        parse(text)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "!!timestamp a",
+        "!!int ''",
+        "!!float a",
+        "!!bool a",
+        "!!python/name:os.system",
+        "2026-99-99",
+        "{[]: a}",
+        "{{}: a}",
+        "9" * 1001,
+        f"0x{'f' * 1000}",
+        f"1{':1' * 100_000}",
+    ],
+    ids=range(11),
+)
+def test_data_that_no_value_fits_are_invalid(value: str) -> None:
+    with pytest.raises(yaml.YAMLError):
+        yaml_data(f"a: {value}\n")

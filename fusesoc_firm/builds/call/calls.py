@@ -11,13 +11,13 @@ from fusesoc_firm.builds.call.parameters import Parameter, check_parameters
 from fusesoc_firm.builds.call.requesting_core import find_requesting_core
 from fusesoc_firm.core.request import CoreFolders, GeneratorCall, MessageFolders, Request
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
-from fusesoc_firm.text.yaml_text import yaml_data
+from fusesoc_firm.text.yaml_text import data_in
 
 
 def read_call(path: Path, generator: str = "") -> GeneratorCall:
     """Read a call from FuseSoC's file, which does not name the generator. May raise `InputError`."""
     try:
-        call = yaml_data(path.read_text(encoding="utf-8"))
+        call = data_in(path)
         return GeneratorCall(generator, str(call["vlnv"]), str(Path(call["files_root"])), call.get("parameters") or {})
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
         fail(f"{path} is not a FuseSoC generator call: {error}")

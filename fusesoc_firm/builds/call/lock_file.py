@@ -22,8 +22,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
-from fusesoc_firm.text.files import read_regular
-from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
+from fusesoc_firm.text.yaml_text import data_in, yaml_dump
 from fusesoc_firm.tools.digests import digest, digest_of
 from fusesoc_firm.tools.programs import debian_package, facts_of, installed_programs, packages
 from fusesoc_firm.tools.reads import Input
@@ -76,7 +75,7 @@ def lock_text(lock: Lock, others: Iterable[str] = ()) -> str:
 def read_lock(path: Path) -> Lock:
     """Read a lock file. Raise `InputError` if it is unreadable or invalid."""
     try:
-        data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
+        data: Any = data_in(path)
         listed = {str(core["name"]): {**core} for core in data["cores"]}
         cores = {name: {"sha256": core["sha256"]} for name, core in listed.items() if "sha256" in core}
         kinds = {**data, "cores": cores}

@@ -5,7 +5,6 @@ An answer is a table, with edges for a picture. Dependencies include those of al
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore
 from fusesoc_firm.builds.setup.outcome import configuration
 from fusesoc_firm.builds.setup.selection import matching
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.text.render import render
 
 Edge = tuple[str, str]
@@ -39,7 +39,7 @@ class Answer:
     def json(self) -> str:
         """Return the rows as objects, and the edges, as JSON."""
         rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
-        return json.dumps({"rows": rows, "edges": [list(edge) for edge in self.edges]}, indent=2)
+        return json_text({"rows": rows, "edges": self.edges}, 2)
 
     def dot(self) -> str:
         """Return the first column and the edges in Graphviz's language."""

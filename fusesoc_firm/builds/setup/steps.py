@@ -241,9 +241,9 @@ def _files_of_parameters(edam: Path) -> tuple[str, ...]:
     text = edam.read_text(encoding="utf-8")
     if "datatype: file" not in text:
         return ()
-    import yaml
+    from fusesoc_firm.text.yaml_text import yaml_data
 
-    parameters = yaml.safe_load(text)["parameters"].values()
+    parameters = yaml_data(text)["parameters"].values()
     return tuple(str(item["default"]) for item in parameters if item["datatype"] == "file" and item.get("default"))
 
 

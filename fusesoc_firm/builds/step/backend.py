@@ -27,9 +27,9 @@ def main(arguments: list[str]) -> int:
 
 
 def _read(edam: str) -> Any:
-    import yaml
+    from fusesoc_firm.text.yaml_text import data_in
 
-    return yaml.safe_load(Path(edam).read_text(encoding="utf-8"))
+    return data_in(Path(edam))
 
 
 def _backend(api: str, name: str) -> Any:

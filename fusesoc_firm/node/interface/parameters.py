@@ -22,6 +22,7 @@ import yaml
 
 from fusesoc_firm.node.interface.options import ROS_ARGUMENTS
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.yaml_text import data_in, yaml_data
 
 # The parameters, by their names; `-` in an option is `_`.
 PARAMETERS = ("transport", "status", "qos", "queue", "overflow", "drain", "restart", "trace", "lifecycle", "ros_python")
@@ -128,7 +129,7 @@ def _of_arguments(name: str, arguments: Sequence[str]) -> Parameters:
 def _of_file(path: Path, node: str) -> Parameters:
     """Return the parameters that a file of ROS 2 sets for a node."""
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = data_in(path)
     except (OSError, UnicodeDecodeError) as error:
         fail(f"cannot read '{path}': {error}")
     except yaml.YAMLError as error:
@@ -180,7 +181,7 @@ def _ros_words(arguments: Sequence[str]) -> Iterator[str]:
 def _value(text: str) -> Any:
     """Return the value of a parameter on a command line, which is YAML."""
     try:
-        value = yaml.safe_load(text)
+        value = yaml_data(text)
     except yaml.YAMLError:
         return text
     return value if isinstance(value, bool | int | float) else text

@@ -22,8 +22,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fusesoc_firm.core.core_reader import CoreFile, read_core
 from fusesoc_firm.core.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.message_sources import core_of, load_beside
@@ -31,6 +29,7 @@ from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.text.files import write_if_changed
+from fusesoc_firm.text.yaml_text import data_in
 from fusesoc_firm.tools.digests import default_root
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import missing, simulation_programs, ways
@@ -192,7 +191,7 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
 
 def _flow(work: Path) -> Any:
     """Return FuseSoC's description of the build."""
-    return yaml.safe_load(next(work.glob("*.eda.yml")).read_text(encoding="utf-8"))
+    return data_in(next(work.glob("*.eda.yml")))
 
 
 def _words(work: Path, tool: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections import Counter
@@ -35,6 +34,7 @@ from fusesoc_firm.runs.simulation.software_run import stimulated
 from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, fail, nearest
+from fusesoc_firm.text.json_text import json_text
 
 # The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
@@ -140,7 +140,7 @@ def replay(
                 settings.watch.epoch_ns = bag.start
             going.play()
         if settings.is_json:
-            print(json.dumps(going.summary(target.path), indent=2, ensure_ascii=False))
+            print(json_text(going.summary(target.path), 2))
         else:
             going.print_summary(target.path)
     if going.errors:

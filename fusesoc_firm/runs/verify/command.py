@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 import time
@@ -20,6 +19,7 @@ from fusesoc_firm.runs.verify.report import Report, as_data, make_report, write_
 from fusesoc_firm.runs.verify.simulation import ghdl
 from fusesoc_firm.runs.verify.task import Verdict
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.text.outputs import check_output, make_folder
 from fusesoc_firm.tools.workers import chosen_workers
 
@@ -70,7 +70,7 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
     report = make_report(entries, settings, time.monotonic() - started)
     beside = write_report(report, places.report) if places.report else None
     if places.is_json:
-        print(json.dumps(as_data(report), indent=2, ensure_ascii=False))
+        print(json_text(as_data(report), 2))
     else:
         _print_summary(report, places)
         if beside:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import platform
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +16,7 @@ from fusesoc_firm.runs.verify.complexity import Level, Statistics
 from fusesoc_firm.runs.verify.judge import versions
 from fusesoc_firm.runs.verify.simulation import STALL_PERCENT, ghdl_version
 from fusesoc_firm.runs.verify.task import Verdict
+from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.text.outputs import write
 from fusesoc_firm.text.render import render
 
@@ -62,7 +62,7 @@ def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) ->
 
 def write_report(report: Report, path: Path) -> Path:
     """Write the report to `path`, and an HTML version next to it; return the path of the HTML file."""
-    write(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
+    write(path, json_text(as_data(report), 1) + "\n")
     beside = path.with_suffix(".html")
     write(beside, as_html(report))
     return beside
