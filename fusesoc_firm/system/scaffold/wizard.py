@@ -6,16 +6,11 @@ comments. In a new file, a comment explains each key at its first use.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
-
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.scalarstring import DoubleQuotedScalarString
-from ruamel.yaml.util import load_yaml_guess_indent
 
 from fusesoc_firm.system.written.specification import (
     ACCELERATOR,
@@ -31,74 +26,66 @@ from fusesoc_firm.system.written.specification import (
     Specification,
     is_core,
 )
+from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, write
 from fusesoc_firm.text.prompts import Asker, Question
-from fusesoc_firm.text.yaml_edit import is_number, word
+from fusesoc_firm.text.yaml_edit import EditError, document, insert, put, value_at
+from fusesoc_firm.text.yaml_edit import Path as Place
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
-from fusesoc_firm.text.yaml_text import read_yaml
+from fusesoc_firm.text.yaml_text import data_of, read_yaml
 
 # All messages that the specification's `paths` provide.
 MessageNames = Callable[[Sequence[str]], Sequence[str]]
 
+Draft = dict[str, Any]
+"""A section as plain data."""
+
+# A key with its value on one line.
+_KEY = re.compile(r" *(?:- )?(\w+): .")
 _YES, _NO = "yes", "no"
 
 
 def extend_specification(path: Path, asker: Asker, message_names: MessageNames) -> None:
     """Ask for a new specification, or for extensions of an existing one, and write the file."""
     check_output(path)
-    is_new = not path.exists()
-    if not is_new:
-        read_yaml(path)  # Report invalid YAML with its place.
-    before = "" if is_new else path.read_text(encoding="utf-8")
-    content = CommentedMap() if is_new else _style(before).load(before)
-    _Wizard(asker, message_names, content, is_new, path.parent).run()
-    text = io.StringIO()
-    _style(before).dump(content, text)
-    write(path, text.getvalue())
+    before = ""
+    content: dict[str, Any] = {}
+    if not (is_new := not path.exists()):
+        read = read_yaml(path)  # Report invalid YAML with its place.
+        before, content = path.read_text(encoding="utf-8"), data_of(read.root)
+        if not isinstance(content, dict):
+            fail(f"{path} is not a specification")
+    wizard = _Wizard(asker, message_names, content, is_new, path.parent, before)
+    try:
+        wizard.run()
+    except EditError as error:
+        fail(f"cannot extend {path}: {error}")
+    write(path, _explained(document(content), wizard.explained) if is_new else wizard.text)
 
 
-def _style(text: str) -> YAML:
-    """Return a YAML writer with the quotes and the list indentation of `text`.
-
-    In new files, plain words have no quotes.
-    """
-    yaml = YAML()
-    yaml.preserve_quotes = True
-    yaml.brace_single_entry_mapping_in_flow_sequence = True
-    yaml.width = 10**6
-    # The dash of a list item and the text after the dash; the dash is in the column of the list's key.
-    _, item, dash = load_yaml_guess_indent(text) if text else (None, None, None)
-    yaml.indent(sequence=item or 4, offset=2 if dash is None else dash)
-    return yaml
-
-
-def _word(answer: str) -> Any:
-    """Return an answer as a scalar, in quotes if YAML would otherwise misread it, alone or in a list."""
-    written = word(answer)
-    if written != answer:
-        return DoubleQuotedScalarString(answer)
-    return int(answer) if is_number(answer) else answer
-
-
-def _words(answers: Sequence[str]) -> Any:
-    """Return one line of answers as a scalar or as a list in brackets."""
-    if len(answers) < 2:
-        return _word(answers[0]) if answers else []
-    words = CommentedSeq(map(_word, answers))
-    words.fa.set_flow_style()
-    return words
+def _explained(text: str, meanings: dict[str, str]) -> str:
+    """Return a text with a comment at the first use of each key."""
+    lines = text.splitlines()
+    for number, line in enumerate(lines):
+        if meaning := (found := _KEY.match(line)) and meanings.pop(found[1], None):
+            lines[number] = f"{line} # {meaning}"
+    return "\n".join([*lines, ""])
 
 
 @dataclass
 class _Wizard:
-    """The state of one run: the specification so far and, for a new specification, the keys explained so far."""
+    """The state of one run: the specification so far, as data and, unless it is new, as text.
+
+    `explained` contains the meaning of each key so far.
+    """
 
     asker: Asker
     message_names: MessageNames
-    content: Any
+    content: dict[str, Any]
     is_new: bool
     folder: Path
-    explained: set[str] = field(default_factory=set)
+    text: str
+    explained: dict[str, str] = field(default_factory=dict)
 
     def run(self) -> None:
         """Ask all questions, in the order of the grammar."""
@@ -108,7 +95,7 @@ class _Wizard:
             self._ask_paths()
         for name in ("accelerators", "blocks"):
             if added := self._sections(name, _key(Specification, name)):
-                self.content.setdefault(name, []).extend(added)
+                self._add([name], added, keys_of(Specification))
         if not self.is_new:
             self._connect_blocks()
 
@@ -118,7 +105,7 @@ class _Wizard:
         question = Question("paths", entry.meaning, check=self._fault_of_path)
         if found := self._texts(question):
             self.content["paths"] = found
-            self._explain(self.content, "paths", entry)
+            self._explain("paths", entry)
 
     def _fault_of_path(self, answer: str) -> str | None:
         is_there = is_core(answer) or (self.folder / answer).exists()
@@ -126,38 +113,49 @@ class _Wizard:
 
     def _connect_blocks(self) -> None:
         """Ask for further connections from existing blocks of the file."""
-        blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
-        question = Question("block", "the block to which connections are added", [*blocks], is_choice=True)
+        names = self._names("blocks")
+        question = Question("block", "the block to which connections are added", names, is_choice=True)
         while name := self.asker.ask(question):
             if added := self._sections("outgoing", _key(Block, "outgoing"), name):
-                blocks[name].setdefault("outgoing", []).extend(added)
+                self._add(["blocks", names.index(name), "outgoing"], added, keys_of(Block))
+
+    def _add(self, path: Place, added: Sequence[Draft], order: Iterable[str]) -> None:
+        """Append sections to the list at a path."""
+        above = value_at(self.content, path[:-1])
+        before = above.get(path[-1]) or []
+        above[path[-1]] = [*before, *added]
+        if self.is_new:
+            return
+        if not before:
+            self.text = put(self.text, path, added, [*order])
+        for number, item in enumerate(added if before else (), len(before)):
+            self.text = insert(self.text, path, number, item)
 
     # --- sections --------------------------------------------------------------------------------------------------
 
-    def _sections(self, name: str, entry: Key, owner: str = "") -> list[CommentedMap]:
+    def _sections(self, name: str, entry: Key, owner: str = "") -> list[Draft]:
         """Ask for as many sections as the user wants; a mandatory list gets at least one."""
         assert entry.section
         question = Question(f"add to '{name}'", entry.meaning, (_YES, _NO), is_choice=True, default=_NO)
-        found: list[CommentedMap] = []
+        found: list[Draft] = []
         while (entry.is_required and self.is_new and not found) or self.asker.ask(question) == _YES:
             self.asker.tell(f"{name} {len(found) + 1}{f' of {owner}' if owner else ''}")
             found.append(self._section(entry.section, found))
         return found
 
-    def _section(self, section: type[Section], siblings: Sequence[CommentedMap] = ()) -> CommentedMap:
+    def _section(self, section: type[Section], siblings: Sequence[Draft] = ()) -> Draft:
         """Ask for one section, key by key."""
         draft = _Draft(section, siblings)
         for name, (field_name, entry) in keys_of(section).items():
             if draft.has(name, entry) and (value := self._value(draft, name, field_name, entry)):
                 draft.made[name] = value
-                self._explain(draft.made, name, entry)
+                self._explain(name, entry)
         return draft.made
 
-    def _explain(self, made: CommentedMap, name: str, entry: Key) -> None:
-        """Add a comment that explains a key at its first use; a section's name needs no explanation."""
-        if self.is_new and entry.section is None and name not in self.explained:
-            self.explained.add(name)
-            made.yaml_add_eol_comment(entry.meaning, name, column=0)
+    def _explain(self, name: str, entry: Key) -> None:
+        """Note the meaning of a key at its first use; a section's name needs no explanation."""
+        if entry.section is None:
+            self.explained.setdefault(name, entry.meaning)
 
     def _value(self, draft: _Draft, name: str, field_name: str, entry: Key) -> Any:
         """Ask for a key's value; return an empty value if the user omits the key."""
@@ -179,9 +177,7 @@ class _Wizard:
         if entry.form == "texts":
             return self._texts(question)
         answer = self.asker.ask(question)
-        if answer == question.default:
-            return None
-        return _word(answer) if answer else None
+        return "" if answer == question.default else answer
 
     def _texts(self, question: Question) -> Any:
         """Ask for answers until an answer is empty."""
@@ -189,7 +185,7 @@ class _Wizard:
         further = Question(f"another item of {question.name}", question.meaning, question.words, check=question.check)
         while answer := self.asker.ask(further if found else question):
             found.append(answer)
-        return _words(found)
+        return found[0] if len(found) == 1 else found
 
     # --- answers ---------------------------------------------------------------------------------------------------
 
@@ -230,8 +226,8 @@ class _Draft:
     """An unfinished section, with the finished sections of the same list."""
 
     section: type[Section]
-    siblings: Sequence[CommentedMap]
-    made: CommentedMap = field(default_factory=CommentedMap)
+    siblings: Sequence[Draft]
+    made: Draft = field(default_factory=dict)
 
     def has(self, name: str, entry: Key) -> bool:
         """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
