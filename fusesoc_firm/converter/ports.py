@@ -10,11 +10,7 @@ from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 from fusesoc_firm.text.reserved import declared_names
 
-_TEMPLATES = (
-    "vhdl/subscriber.vhd",
-    "vhdl/publisher.vhd",
-    *(f"partials/{name}" for name in ("store_signals", "store_enables", "store_beats", "store_resets", "stored_field")),
-)
+_TEMPLATES = ("vhdl/subscriber.vhd", "vhdl/publisher.vhd")
 # The port of a field with one of these names has a different name. The templates use the first names without declaring
 # them, and declare `store` and `fields_r` with an empty suffix. The last line keeps the names of ports of version 0.1.
 _TAKEN = declared_names(*_TEMPLATES) | set(

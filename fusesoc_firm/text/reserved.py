@@ -15,6 +15,7 @@ _USED = frozenset(
 _TAG = re.compile(r"\{\{\{?[^}]*\}?\}\}")
 # Columns, and the tags of sections, which leave no text.
 _MARK = re.compile(r"\{\{[|#^/][^}]*\}\}")
+_PARTIAL = re.compile(r"\{\{> *([\w/]+)")
 _COMMENT = re.compile(r"--.*")
 _DECLARED = re.compile(
     r"^\s*(?:signal|constant|variable|type|subtype|function|alias)\s+"
@@ -32,10 +33,12 @@ def reserved_names(*templates: str) -> frozenset[str]:
 
 @cache
 def declared_names(*templates: str) -> frozenset[str]:
-    """Return the names that VHDL templates declare, in lower case, except names with tags."""
+    """Return the names that VHDL templates and their partials declare, in lower case, except names with tags."""
     found: set[str] = set()
     for template in templates:
-        text = _MARK.sub("", _COMMENT.sub("", template_text(template)))
+        text = template_text(template)
+        found |= declared_names(*(f"partials/{name}" for name in _PARTIAL.findall(text)))
+        text = _MARK.sub("", _COMMENT.sub("", text))
         text = _TAG.sub("\N{REPLACEMENT CHARACTER}", text)
         for names in _DECLARED.findall(text):
             found |= {name.strip().lower() for group in names for name in group.split(",") if name.strip()}

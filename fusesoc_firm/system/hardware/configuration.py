@@ -15,11 +15,11 @@ from fusesoc_firm.system.hardware.instances import (
     accelerator_instance,
     component,
     pin_synchroniser,
-    publisher_instance,
-    subscriber_instance,
+    publisher_instances,
+    subscriber_instances,
 )
 from fusesoc_firm.system.hardware.interconnect import interconnect_configuration
-from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.maps import instance, port_map
 from fusesoc_firm.system.hardware.names import (
     OWN_RESET,
     RELEASED,
@@ -53,7 +53,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         **interconnect_configuration(system),
         **status_configuration(system),
         **scheduler_configuration(system),
-        "watchdog": {"cycles": system.watchdog} if system.watchdog else None,
+        "has_watchdog": system.watchdog > 0,
         "clocks": _clocks(system),
         "resets": _resets(system),
         "publisher_errors": [
@@ -63,8 +63,8 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         ],
         "components": [component(type_) for type_ in system.accelerator_types if type_.is_component],
         "signals": [_signals(names, *block) for block in blocks(system)],
-        "subscribers": [subscriber_instance(names, converter, system) for converter in system.subscribers],
-        "publishers": [publisher_instance(names, converter, system) for converter in system.publishers],
+        "subscribers": [subscriber_instances(names, converter, system) for converter in system.subscribers],
+        "publishers": [publisher_instances(names, converter, system) for converter in system.publishers],
         "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
         "pins": pin_groups(names, system),
         "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
@@ -142,19 +142,26 @@ def _resets(system: DerivedSystem) -> Context:
 
     The reset of clk is released separately. The domains of crossings are reset in turn and released together.
     """
-    instances = [_reset("clk", "", OWN_RESET)]
+    # Each reset with its clock and the reset that it waits for.
+    turns = [(OWN_RESET, "clk", "")]
     if system.clocks:
         before = ""
         for clock in system.clocks:
-            instances.append(_reset(clock.port, before, seen_reset(clock)))
+            turns.append((seen_reset(clock), clock.port, before))
             before = seen_reset(clock)
-        instances.append(_reset("clk", before, RELEASED))
-        instances += [_reset(clock.port, RELEASED, clock.reset) for clock in system.clocks]
-    return {"signals": [item["reset"] for item in instances], "has_turns": bool(system.clocks), "instances": instances}
+        turns.append((RELEASED, "clk", before))
+        turns += [(clock.reset, clock.port, RELEASED) for clock in system.clocks]
+    return {
+        "signals": [reset for reset, _, _ in turns],
+        "has_turns": bool(system.clocks),
+        "instances": [_reset(*turn) for turn in turns],
+    }
 
 
-def _reset(clock: str, may_end: str, reset: str) -> Context:
-    return {"label": reset_label(reset), "clock": clock, "may_end": may_end, "reset": reset}
+def _reset(reset: str, clock: str, may_end: str) -> Context:
+    ends = [("may_end", may_end)] if may_end else []
+    ports = [("clk", clock), ("rst_n", "rst_n"), *ends, ("synced_rst_n", reset)]
+    return instance(reset_label(reset), "entity firm.firm_cdc_reset", ports)
 
 
 def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:

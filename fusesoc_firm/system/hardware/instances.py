@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.converter.vhdl import bits, vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
@@ -17,11 +18,11 @@ from fusesoc_firm.system.derived.model import (
 )
 from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
 from fusesoc_firm.system.hardware.crossings import port_of
-from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.maps import instance
 from fusesoc_firm.system.hardware.names import (
     ERROR_WORDS,
-    FRAME_WORDS,
-    LATE_WORDS,
+    OWN_RESET,
+    STREAM,
     Names,
     publishers_with_watchdog,
     queue_word,
@@ -30,69 +31,98 @@ from fusesoc_firm.system.hardware.names import (
 from fusesoc_firm.system.written.specification import Pin
 
 ERROR_CODE_BITS = 4
+_CLOCK = (("clk", "clk"), ("rst_n", OWN_RESET))
 # The prefix of internal signals that replace ports of the top level if the status reads or changes them.
 INNER = "inner_"
 
 
-def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the instance of a subscriber, with its queue or watchdog between the Manager and the subscriber."""
+def subscriber_instances(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return a subscriber, with its queue or watchdog between the Manager and the subscriber."""
+    block, queue = converter.block, converter.queue
+    frame = _stream("s", "", _from_manager(converter.id))
+    if queue:
+        frame = _stream("s", "", _frame_signals(names.frame, block))
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
-        **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
-        "message": str(converter.frame.message),
-        "id": converter.id,
-        "max_length": converter.max_length,
-        "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": error_of(converter, system),
-        "queue": _queue(names, converter, system) if converter.queue else None,
+        **_head(converter),
+        "instance": instance(
+            names.label(block),
+            f"entity work.{subscriber_entity(converter.frame, converter.suffix)}",
+            [
+                *_CLOCK,
+                *frame,
+                *((port.name, names.port(block, port.name)) for port in ports),
+                *(_own_errors(names, block) if queue else _system_errors(converter, system)),
+            ],
+            [("MAX_LENGTH", converter.max_length)] if converter.max_length else (),
+        ),
+        "queue": _queue(names, converter, queue, system) if queue else None,
     }
 
 
-def _queue(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+def _queue(names: Names, converter: Converter, queue: Queue, system: DerivedSystem) -> dict[str, Any]:
     """Return the queue or the watchdog before a subscriber, with the signals between it and the subscriber."""
-    assert converter.queue
-    block, lanes, queue = converter.block, system.width // 8, converter.queue
+    block, word = converter.block, queue_word(queue)
+    unit, generics = ("queue", _memory(queue, system)) if not queue.limit else ("sink_watchdog", _limit(queue, system))
     return {
-        "block": block,
-        "unit": queue_word(queue),
-        "label": names.label(block, queue_word(queue)),
-        "width": system.width,
-        "lanes": lanes,
-        "watchdog": {"limit": queue.limit} if queue.limit else None,
-        "memory": None if queue.limit else _memory(queue, lanes),
-        **{word: names.frame(block, word) for word in FRAME_WORDS},
-        "id": converter.id,
-        "out": error_of(converter, system),
+        **_frame(names, block, system),
+        "unit": word,
+        "instance": instance(
+            names.label(block, word),
+            f"entity firm.firm_axis_{unit}",
+            [
+                *_CLOCK,
+                *_stream("s", "", _from_manager(converter.id)),
+                *_stream("m", "", _frame_signals(names.frame, block)),
+                *_own_errors(names, block, "s_"),
+                *_system_errors(converter, system),
+            ],
+            generics,
+        ),
     }
 
 
-def _memory(queue: Queue, lanes: int) -> dict[str, Any]:
+def _limit(queue: Queue, system: DerivedSystem) -> list[tuple[str, object]]:
+    return [("WIDTH", system.width), ("LIMIT", queue.limit)]
+
+
+def _memory(queue: Queue, system: DerivedSystem) -> list[tuple[str, object]]:
     """Return the size of a queue; one beat more than the longest frame detects a longer frame."""
+    lanes = system.width // 8
     beats = -(-(ID_BYTES + LENGTH_BYTES + queue.longest) // lanes)
-    return {
-        "frames": queue.frames,
-        # The Manager removes a beat that contains only the id.
-        "beats": beats + (0 if lanes == ID_BYTES else 1),
-        "drop": None if queue.overflow is Overflow.BLOCK else {"generic": queue.overflow.value.upper()},
-    }
+    drop = [] if queue.overflow is Overflow.BLOCK else [(queue.overflow.value.upper(), "true")]
+    # The Manager removes a beat that contains only the id.
+    further = 0 if lanes == ID_BYTES else 1
+    return [("WIDTH", system.width), ("FRAMES", queue.frames), *drop, ("BEATS", beats + further)]
 
 
-def publisher_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the instance of a publisher, followed by its buffer if it stores whole frames."""
-    ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
+def publisher_instances(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """Return a publisher, followed by its buffer if it stores whole frames, and by its FIFO for late frames."""
+    block = converter.block
     has_watchdog = converter in publishers_with_watchdog(system)
+    ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
+    sink = _late_input(names, block) if converter.late_bytes else _to_manager(converter, system)
+    frame, errors = _stream("m", "(0)", sink), []
+    if converter.buffer:
+        frame, errors = _stream("m", "", _frame_signals(names.frame, block)), _own_errors(names, block)
+    elif has_watchdog:
+        errors = _own_errors(names, block)
+    elif converter.may_pause:
+        errors = _system_errors(converter, system)
     return {
-        **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
-        "message": str(converter.frame.message),
-        "id": converter.id,
-        "id_byte": converter.id % 256,
-        "beats": _beats(names, converter, system),
-        "late": _late(names, converter, system) if converter.late_bytes else None,
-        "max_length": {"bytes": converter.max_length} if converter.max_length else None,
-        "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
-        "error": error_of(converter, system) if converter.may_pause and not has_watchdog else None,
+        **_head(converter),
+        "instance": instance(
+            names.label(block),
+            f"entity work.{publisher_entity(converter.frame, converter.suffix)}",
+            [*_CLOCK, *((port.name, names.port(block, port.name)) for port in ports), *frame, *errors],
+            [
+                *([("MAX_LENGTH", converter.max_length)] if converter.max_length else ()),
+                ("ID", converter.id % 256),
+            ],
+        ),
         "own_error": _own_error(names, converter, system) if has_watchdog else None,
-        "buffer": _buffer(names, converter, system) if converter.buffer else None,
+        "buffer": _buffer(names, converter, sink, system) if converter.buffer else None,
+        "late": _late(names, converter, system) if converter.late_bytes else None,
     }
 
 
@@ -106,40 +136,98 @@ def _own_error(names: Names, converter: Converter, system: DerivedSystem) -> dic
     }
 
 
-def _beats(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the sink signals for a publisher's frames: the FIFO for late frames if present, else the Manager."""
-    if not converter.late_bytes:
-        return _manager_beats(converter, system)
-    return {**{word: names.late(converter.block, word) for word in LATE_WORDS}, "place": 0, "slice": None}
-
-
-def _manager_beats(converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the part of the Manager's inputs that receives a publisher's frames."""
-    place, width = system.places[converter.id], system.width
-    lanes = width // 8
-    part = {
-        "place": place,
-        "data_high": width * (place + 1) - 1,
-        "data_low": width * place,
-        "keep_high": lanes * (place + 1) - 1,
-        "keep_low": lanes * place,
+def _buffer(names: Names, converter: Converter, sink: Sequence[str], system: DerivedSystem) -> dict[str, Any]:
+    """Return the buffer after a publisher, with the signals between publisher and buffer."""
+    block, width = converter.block, system.width
+    depth = max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // (width // 8)))
+    return {
+        **_frame(names, block, system),
+        "instance": instance(
+            names.label(block, "buffer"),
+            "entity firm.firm_axis_length_buffer",
+            [
+                *_CLOCK,
+                *_stream("s", "", _frame_signals(names.frame, block)),
+                *_stream("m", "(0)", sink),
+                *_own_errors(names, block, "s_"),
+                *_system_errors(converter, system),
+            ],
+            [("WIDTH", width), ("DEPTH", depth)],
+        ),
     }
-    return {**{word: f"pub_axis_{word}" for word in LATE_WORDS}, "place": place, "slice": part}
 
 
 def _late(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return the FIFO between a publisher and the Manager for late frames."""
-    block, lanes = converter.block, system.width // 8
+    block, width = converter.block, system.width
+    signals = _frame_signals(names.late, block)
     return {
         "block": block,
-        "label": names.label(block, "late"),
         "bytes": converter.late_bytes,
-        "width": system.width,
-        "lanes": lanes,
-        "depth": max(2, -(-converter.late_bytes // lanes)),
-        **{word: names.late(block, word) for word in LATE_WORDS},
-        "beats": _manager_beats(converter, system),
+        **_widths(system),
+        **dict(zip(STREAM, signals, strict=True)),
+        "instance": instance(
+            names.label(block, "late"),
+            "entity firm.firm_axis_fifo",
+            [*_CLOCK, *_stream("s", "", signals), *_stream("m", "(0)", _to_manager(converter, system))],
+            [("WIDTH", width), ("DEPTH", max(2, -(-converter.late_bytes // (width // 8))))],
+        ),
     }
+
+
+def _head(converter: Converter) -> dict[str, Any]:
+    return {"block": converter.block, "message": str(converter.frame.message), "id": converter.id}
+
+
+def _frame(names: Names, block: str, system: DerivedSystem) -> dict[str, Any]:
+    """Return the signals between a converter and its queue, watchdog or buffer."""
+    return {"block": block, **_widths(system), **{word: names.frame(block, word) for word in (*STREAM, *ERROR_WORDS)}}
+
+
+def _widths(system: DerivedSystem) -> dict[str, int]:
+    return {"width": system.width, "lanes": system.width // 8}
+
+
+def _stream(side: str, bit: str, signals: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the map of an AXI4-Stream port; `bit` is "(0)" if the signal for tuser is a single bit."""
+    formals = (f"{side}_axis_{word}{bit if word == 'tuser' else ''}" for word in STREAM)
+    return list(zip(formals, signals, strict=True))
+
+
+def _frame_signals(name: Callable[[str, str], str], block: str) -> list[str]:
+    return [name(block, word) for word in STREAM]
+
+
+def _late_input(names: Names, block: str) -> list[str]:
+    return [f"{names.late(block, word)}{'(0)' if word == 'tuser' else ''}" for word in STREAM]
+
+
+def _from_manager(number: int) -> list[str]:
+    """Return the outputs of the Manager to a subscriber; all subscribers see the same beat."""
+    return [f"sub_axis_{word}{f'({number})' if word in ('tvalid', 'tready') else ''}" for word in STREAM]
+
+
+def _to_manager(converter: Converter, system: DerivedSystem) -> list[str]:
+    """Return the part of the Manager's inputs that receives a publisher's frames."""
+    place, widths = system.places[converter.id], {"tdata": system.width, "tkeep": system.width // 8}
+    return [
+        bits(f"pub_axis_{word}", width * (place + 1) - 1, width * place)
+        if (width := widths.get(word))
+        else f"pub_axis_{word}({place})"
+        for word in STREAM
+    ]
+
+
+def _own_errors(names: Names, block: str, side: str = "") -> list[tuple[str, str]]:
+    return [(f"{side}frame_{word}", names.frame(block, word)) for word in ERROR_WORDS]
+
+
+def _system_errors(converter: Converter, system: DerivedSystem) -> list[tuple[str, str]]:
+    error = error_of(converter, system)
+    return [
+        ("frame_error", f"{error['scope']}frame_error({error['bit']})"),
+        ("frame_error_code", f"{error['scope']}frame_error_code({error['high']} downto {error['low']})"),
+    ]
 
 
 def error_of(converter: Converter, system: DerivedSystem) -> dict[str, int | str]:
@@ -149,52 +237,43 @@ def error_of(converter: Converter, system: DerivedSystem) -> dict[str, int | str
     return {"scope": scope, "bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
 
 
-def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """Return the buffer after a publisher, with the signals between publisher and buffer."""
-    block, lanes = converter.block, system.width // 8
-    return {
-        "block": block,
-        "label": names.label(block, "buffer"),
-        "width": system.width,
-        "lanes": lanes,
-        "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
-        **{word: names.frame(block, word) for word in FRAME_WORDS},
-        "beats": _beats(names, converter, system),
-        "out": error_of(converter, system),
-    }
-
-
 def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedSystem) -> dict[str, Any]:
     """Return the instance of an accelerator, with its message sides and pins."""
-    clock = system.clock_of(block.block)
+    clock, type_ = system.clock_of(block.block), block.type
     differences = [clock.port] if clock else []
-    differences += [f"{block.type.width} bits"] if block.type.width != system.width else []
-    sides = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
+    differences += [f"{type_.width} bits"] if type_.width != system.width else []
+    sides = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(type_)]
     ports = [(formal, names.port(block.block, formal)) for formal in sides]
-    for pin in block.type.accelerator.pins:
+    for pin in type_.accelerator.pins:
         signal = names.synced if pin.is_synchronised else names.port
         ports.append((str(pin.name), signal(block.block, pin.name)))
     return {
-        **_instance(names, block.block, block.type.entity),
-        "is_component": block.type.is_component,
-        "has_width": block.type.has_width,
-        "width": block.type.width,
         "differences": ", ".join(differences),
-        "clock": port_of(clock),
-        "reset": reset_of(clock),
-        "ports": port_map(ports),
+        **instance(
+            names.label(block.block),
+            f"component {type_.entity}" if type_.is_component else f"entity work.{type_.entity}",
+            [("clk", port_of(clock)), ("rst_n", reset_of(clock)), *ports],
+            [("WIDTH", type_.width)] if type_.has_width else (),
+        ),
     }
 
 
 def pin_synchroniser(names: Names, block: AcceleratorBlock, pin: Pin, system: DerivedSystem) -> dict[str, Any]:
     """Return the synchroniser of an input pin, in the clock of its block."""
+    synced, bit = names.synced(block.block, pin.name), "" if pin.bits else "(0)"
     return {
-        "label": names.label(block.block, pin.name, "sync"),
-        "bits": pin.bits,
+        "synced": synced,
         "type": vhdl_type(pin.bits),
-        "clock": port_of(system.clock_of(block.block)),
-        "pin": names.port(block.block, pin.name),
-        "synced": names.synced(block.block, pin.name),
+        **instance(
+            names.label(block.block, pin.name, "sync"),
+            "entity firm.firm_cdc_sync",
+            [
+                ("clk", port_of(system.clock_of(block.block))),
+                (f"level{bit}", names.port(block.block, pin.name)),
+                (f"synced{bit}", synced),
+            ],
+            [("BITS", pin.bits)] if pin.bits else (),
+        ),
     }
 
 
@@ -223,7 +302,3 @@ def declarations(accelerator: AcceleratorType) -> list[dict[str, Any]]:
         }
         for prefix, port in accelerator_ports(accelerator)
     ]
-
-
-def _instance(names: Names, block: str, entity: str) -> dict[str, Any]:
-    return {"block": block, "label": names.label(block), "entity": entity}

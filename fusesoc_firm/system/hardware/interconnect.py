@@ -111,22 +111,31 @@ _BAUD = 1_000_000
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
     """Return the configuration of the host side: streams as ports, a link or a node."""
-    nothing = {"has_streams": False, "link": None, "node": None, "ethernet": None}
+    found: dict[str, Any] = {"has_streams": False, "link": None, "node": None, "ethernet": None, "host_end": "node"}
+    ids = "ids count from 0 in each direction."
     if system.network and system.network.kind is NetworkKind.ETHERNET:
-        return {**nothing, "ethernet": _ethernet(system, system.network.phy)}
-    if system.network:
-        return {**nothing, "node": _node(system)}
-    if system.link is None:
-        return {**nothing, "has_streams": True}
+        found |= {"ethernet": _ethernet(system, system.network.phy)}
+        found |= {"host_note": "The system is a node of ROS 2 by Ethernet."}
+    elif system.network:
+        found |= {"node": (node := _node(system))}
+        found |= {"host_note": f"The system is a node of ROS 1 in the sockets of a W{node['chip']}."}
+    elif system.link:
+        found |= {"link": (link := _link(system.link)), "host_end": "link"}
+        found |= {"host_note": f"The host sends and receives frames through {link['entity']}; {ids}"}
+    else:
+        found |= {"has_streams": True, "host_end": ""}
+        found |= {"host_note": f"The host sends frames on s_axis and receives frames on m_axis; {ids}"}
+    return found
+
+
+def _link(link: Link) -> dict[str, Any]:
+    """Return a link, with its core and the core of the simulated host."""
     return {
-        **nothing,
-        "link": {
-            "entity": f"firm_{system.link.kind.value}_link",
-            "longest": system.link.longest,
-            "adapter": f"firm_sim_{system.link.kind.value}",
-            "uart": _uart(system.link) if system.link.kind is LinkKind.UART else None,
-            "pins": _pins(LINK_PINS[system.link.kind]),
-        },
+        "entity": f"firm_{link.kind.value}_link",
+        "longest": link.longest,
+        "adapter": f"firm_sim_{link.kind.value}",
+        "uart": _uart(link) if link.kind is LinkKind.UART else None,
+        "pins": _pins(LINK_PINS[link.kind]),
     }
 
 
@@ -153,6 +162,7 @@ def _ethernet(system: DerivedSystem, phy: Phy) -> dict[str, Any]:
         "phy": f"firm_{phy.value}",
         # An RMII does not report errors to the PHY.
         "sends_errors": phy is not Phy.RMII,
+        "tx_error": "open" if phy is Phy.RMII else "line_tx_er",
         "pins": [{**pin, **_in_simulation(phy, pin)} for pin in _pins(phy_pins(phy))],
         "line_bits": _LINE_BITS[phy],
         "is_ddr": phy is Phy.RGMII,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.payload_length import length_entity
@@ -30,16 +31,11 @@ from fusesoc_firm.system.written.specification import Pin
 from fusesoc_firm.text.naming import distinct_identifiers
 from fusesoc_firm.text.reserved import reserved_names
 
-_TEMPLATES = (
-    "vhdl/system.vhd",
-    "vhdl/test_bench.vhd",
-    *(f"partials/{name}" for name in ("status_port", "status_signals", "status")),
-)
+_TEMPLATES = ("vhdl/system.vhd", "vhdl/test_bench.vhd")
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
+STREAM = ("tdata", "tkeep", "tuser", "tvalid", "tlast", "tready")
 # The reset of clk's domain.
 OWN_RESET = "system_rst_n"
-# Names in the top level and its test bench that signals of blocks, pins and labels must not have.
-_TAKEN = reserved_names(*_TEMPLATES) | {pin for pins in HOST_PINS for pin, *_ in pins} | {OWN_RESET, "u_system_rst"}
 # Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
 # Between a publisher and its buffer, and between a subscriber and its queue or watchdog.
@@ -49,6 +45,12 @@ FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
 ERROR_WORDS = ("error", "error_code")
 # Between a publisher and the FIFO for late frames.
 LATE_WORDS = (*AXIS, "tuser")
+
+
+@cache
+def taken_names() -> frozenset[str]:
+    """Return the names in the top level and its test bench that signals of blocks, pins and labels must not have."""
+    return reserved_names(*_TEMPLATES) | {pin for pins in HOST_PINS for pin, *_ in pins} | {OWN_RESET, "u_system_rst"}
 
 
 class Names:
@@ -73,14 +75,14 @@ class Names:
         synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
         labels += [("u", *pin, "sync") for pin in synchronised]
         labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
-        label_names = distinct_identifiers(labels, _TAKEN)
+        label_names = distinct_identifiers(labels, taken_names())
         self._labels = dict(zip(labels, label_names, strict=True))
 
         entities = {subscriber_entity(item.frame, item.suffix) for item in system.subscribers}
         entities |= {publisher_entity(item.frame, item.suffix) for item in system.publishers}
         entities |= {item.entity for item in system.accelerator_types}
         entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
-        reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
+        reserved = {*taken_names(), system.entity, *entities, *label_names, *clock_names(system)}
         # Keys of instances between blocks have three parts, so such a key never equals the key of a field.
         ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
         signals: list[tuple[str, ...]] = [

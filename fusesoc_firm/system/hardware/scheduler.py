@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, groupby
 from typing import Any
 
@@ -44,9 +44,20 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
         "groups": _groups(scheduling.groups) if scheduling.groups else None,
         "scheduler": entity,
         "scheduler_generics": port_map([("REQUESTERS", str(len(system.publishers))), *generics]),
-        "is_preemptive": scheduling.is_preemptive,
+        "manager_generics": port_map(_manager_generics(system)),
         "scheduler_times": {"constants": constants} if constants else None,
     }
+
+
+def _manager_generics(system: DerivedSystem) -> Iterator[tuple[str, str]]:
+    """Yield the generics of the Manager."""
+    yield "WIDTH", str(system.width)
+    yield "SUBSCRIBERS", str(len(system.subscribers))
+    if system.scheduling.is_preemptive:
+        yield "PREEMPTIVE", "true"
+    if system.watchdog:
+        yield "WATCHDOG", str(system.watchdog)
+    yield "PUBLISHERS", str(len(system.publishers))
 
 
 def _policy(name: str) -> str:

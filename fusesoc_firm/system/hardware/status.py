@@ -135,16 +135,22 @@ def status_entity(system: DerivedSystem) -> str:
 
 def status_configuration(system: DerivedSystem) -> Context:
     """Return the connection of the status to the top level, and the resulting changes there."""
-    is_frames = system.status is StatusAccess.FRAMES
     return {
         "scope": INNER if system.status else "",
         "inner": INNER if _has_inner_streams(system) else "",
         "address_bits": address_bits(system),
-        "link_tid": f"{INNER}m_axis_tid" if is_frames else "open",
+        "manager_tid": _manager_tid(system),
         "has_status": bool(system.status),
         "status_bus": system.status is StatusAccess.AXI_LITE,
         "status": _instances(system) if system.status else None,
     }
+
+
+def _manager_tid(system: DerivedSystem) -> str:
+    """Return the signal that receives the ids of the Manager's frames, of which links and nodes use the first byte."""
+    if system.link or system.network:
+        return f"{INNER}m_axis_tid" if system.status is StatusAccess.FRAMES else "open"
+    return f"{INNER if _has_inner_streams(system) else ''}m_axis_tid"
 
 
 def address_bits(system: DerivedSystem) -> int:

@@ -15,7 +15,7 @@ from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End, Le
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake, handshakes, side_ports
 from fusesoc_firm.system.hardware.crossing_wires import SourceSide, crossing_configuration, field_pairs
 from fusesoc_firm.system.hardware.crossings import Crossing, crossings, port_of
-from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.maps import instance
 from fusesoc_firm.system.hardware.names import Names, forked, is_found_out, reset_of
 
 # A 32-bit length.
@@ -148,34 +148,34 @@ def _length(names: Names, connection: Connection) -> dict[str, Any]:
     """Return the instance that computes the length of an accelerator's payloads."""
     source = connection.source
     inputs = ((formal, names.at(source, formal)) for formal in length_ports(connection.frame))
-    return {
-        "label": names.label(source.block, source.prefix, "length"),
-        "entity": length_entity(connection.frame, connection.length.suffix if connection.length else ""),
-        "ports": port_map([*inputs, (PAYLOAD_LENGTH, names.length(connection))]),
-    }
+    return instance(
+        names.label(source.block, source.prefix, "length"),
+        f"entity work.{length_entity(connection.frame, connection.length.suffix if connection.length else '')}",
+        [*inputs, (PAYLOAD_LENGTH, names.length(connection))],
+    )
 
 
 def _fork(names: Names, connection: Connection, fork: Handshake, system: DerivedSystem) -> dict[str, Any]:
     source, count = connection.source, len(connection.sinks)
     clock = system.clock_of(source.block)
     source_valid = names.at(source, fork.valid)
+    generics, signals = [("SINKS", count)], [(names.forked(source, fork, word), count) for word in ("valid", "ready")]
+    ports = [
+        ("clk", port_of(clock)),
+        ("rst_n", reset_of(clock)),
+        ("source_valid", bit(source_valid, 0) if connection.frame.is_fixed_size else source_valid),
+        ("source_ready", names.at(source, fork.ready)),
+    ]
+    sinks = [("sink_valid", signals[0][0]), ("sink_ready", signals[1][0])]
+    if fork.segment_valid is not None:
+        segment_valid = names.forked(source, fork, "segment_valid")
+        generics.append(("SEGMENTS", fork.segments))
+        signals.append((segment_valid, count * fork.segments))
+        ports.append(("source_segment_valid", names.at(source, fork.segment_valid)))
+        sinks.append(("sink_segment_valid", segment_valid))
     return {
-        "label": names.fork(source, fork),
-        "sinks": count,
-        "clock": port_of(clock),
-        "reset": reset_of(clock),
-        "source_valid": bit(source_valid, 0) if connection.frame.is_fixed_size else source_valid,
-        "source_ready": names.at(source, fork.ready),
-        "sink_valid": names.forked(source, fork, "valid"),
-        "sink_ready": names.forked(source, fork, "ready"),
-        "segments": {
-            "count": fork.segments,
-            "bits": count * fork.segments,
-            "source_segment_valid": names.at(source, fork.segment_valid),
-            "sink_segment_valid": names.forked(source, fork, "segment_valid"),
-        }
-        if fork.segment_valid is not None
-        else None,
+        "signals": [{"name": name, "bits": width} for name, width in signals],
+        **instance(names.fork(source, fork), "entity firm.firm_message_fork", [*ports, *sinks], generics),
     }
 
 
