@@ -46,7 +46,7 @@ REASONS = {
     "converter/variable_publisher.py": {"_count": _OPERAND},
     "runs/verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
     "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
-    "netlist/probed_source.py": {"types": _OPERAND},
+    "netlist/probed_source.py": {"bit_functions": _OPERAND},
     "netlist/verilog.py": {
         **dict.fromkeys(("_either", "_modulus"), "an expression"),
         **dict.fromkeys(

@@ -19,7 +19,8 @@ from pathlib import Path
 
 from fusesoc_firm.netlist.model import Instance, Modules, NetlistError
 from fusesoc_firm.netlist.probe_functions import USE, WORD
-from fusesoc_firm.netlist.probed_source import NAME, Probe, Source, is_within
+from fusesoc_firm.netlist.probed_source import Probe, Prober, bit_functions
+from fusesoc_firm.netlist.vhdl_source import NAME, VhdlSource, is_within
 
 _COMMA = r"\s*,\s*"
 # The text after a constant that is used as a whole, or of which an element is used.
@@ -43,8 +44,9 @@ class Copies:
     """Copies of the source files with probes."""
 
     def __init__(self, files: Iterable[str], folder: Path, widths: Iterable[int]) -> None:
-        self.sources = {name: Source(name, widths) for name in files}
-        types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
+        self.sources = {name: VhdlSource(name) for name in files}
+        ordered = sorted(widths)
+        types = [type_ for source in self.sources.values() for type_ in bit_functions(source, of_packages=True)]
         bits = {name: text for name, _, text in types}
         functions = {name for source in self.sources.values() for name in source.functions()}
         self.folder = folder
@@ -53,7 +55,8 @@ class Copies:
             for are_scalar in (True, False)
         )
         self.probes = {
-            name: list(source.probes(bits, functions, scalars - others)) for name, source in self.sources.items()
+            name: list(Prober(source, ordered).probes(bits, functions, scalars - others))
+            for name, source in self.sources.items()
         }
         # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[Probe]]] = {}
@@ -70,7 +73,7 @@ class Copies:
         self._seen = []
         return {name: self._write(source, index) for index, (name, source) in enumerate(self.sources.items())}
 
-    def _write(self, source: Source, index: int) -> str:
+    def _write(self, source: VhdlSource, index: int) -> str:
         copy = str(self.folder / f"{index}.vhd")
         lines: dict[int, set[Probe]] = defaultdict(set)
         text, last = "", 0

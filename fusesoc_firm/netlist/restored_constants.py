@@ -12,14 +12,14 @@ from dataclasses import replace
 from fusesoc_firm.netlist.lost_constants import may_be_lost
 from fusesoc_firm.netlist.model import Instance, Module, Modules, Net
 from fusesoc_firm.netlist.probe_functions import WORD
-from fusesoc_firm.netlist.probed_source import Source
+from fusesoc_firm.netlist.vhdl_source import VhdlSource
 
 # An actual value: the name of its file, and its position in the file.
 Actual = tuple[str, int]
 
 
 def restore(
-    modules: Modules, sources: Mapping[str, Source], values: Mapping[Actual, Collection[str]]
+    modules: Modules, sources: Mapping[str, VhdlSource], values: Mapping[Actual, Collection[str]]
 ) -> dict[Actual, int]:
     """Restore constants in place; return 0 for constants that are now correct, and the width of the others.
 
@@ -50,7 +50,9 @@ def _highest(values: Collection[str]) -> str:
     return levels[:-1] if set(levels) <= {"0", "1"} else ""
 
 
-def _inputs(module: Module, modules: Modules, sources: Mapping[str, Source]) -> Iterator[tuple[Instance, int, Actual]]:
+def _inputs(
+    module: Module, modules: Modules, sources: Mapping[str, VhdlSource]
+) -> Iterator[tuple[Instance, int, Actual]]:
     """Yield each input of an instance that a port map names: the instance, the input's index and the actual."""
     for instance in module.instances:
         file, line, column = [*instance.location.rsplit(":", 2), "", "", ""][:3]
