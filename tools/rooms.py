@@ -22,6 +22,10 @@ LINKS = {"library", "demos", "docs"}
 _COLUMNS = 24
 
 
+# The modules beside the rooms.
+BESIDE = {"__init__", "__main__"}
+
+
 def modules(package: Path) -> Iterator[Path]:
     """Every module of the package, sorted; none of those that links lead to."""
     return (path for path in sorted(package.rglob("*.py")) if room_of(path, package) not in LINKS)
@@ -61,9 +65,8 @@ def arrows(package: Path = PACKAGE) -> dict[str, set[str]]:
     for path in modules(package):
         rooms = {room for _, room in imported_rooms(ast.parse(path.read_text(encoding="utf-8")))}
         found.setdefault(room_of(path, package), set()).update(rooms)
-    # `from fusesoc_firm import __version__` names the package itself.
-    del found["__init__"]
-    return {room: rooms - {room, "__version__"} for room, rooms in found.items()}
+    # `from fusesoc_firm import __version__` names the package itself; its main module starts `cli`.
+    return {room: rooms - {room, "__version__"} for room, rooms in found.items() if room not in BESIDE}
 
 
 def reduced(graph: Mapping[str, set[str]]) -> dict[str, set[str]]:

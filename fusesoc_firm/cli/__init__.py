@@ -7,6 +7,7 @@ that recalls its results.
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import shutil
 import sys
@@ -59,20 +60,25 @@ GROUPS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; return the exit status: 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
     accept_interrupts()
-    arguments = _parsed(argv)
     try:
+        arguments = _parsed(argv)
         arguments.handler(arguments)
         sys.stdout.flush()
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
     except BrokenPipeError:
         # The reader of the output (`| head`) has closed the pipe, so nothing may be flushed into the pipe at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        print(f"error: no file can have the name '{error.filename}': {error.strerror}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     return 0
 
 

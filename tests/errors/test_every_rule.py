@@ -44,6 +44,7 @@ OTHER_FAULTS = {
     ("system/scaffold/project.py", "new_folder"): "options of the command line",
     ("system/scaffold/project.py", "_check_topics"): "options of the command line",
     ("system/scaffold/example.py", "example_named"): "options of the command line",
+    ("system/scaffold/wizard.py", "extend_specification"): "a file that is extended, in test_wizard",
     ("system/register_files.py", "write_register_files"): "a right specification without a status",
     ("system/derived/status.py", "_check_id"): "a system of 256 converters, in test_status",
     ("system/derived/status.py", "_check_channels"): "a system of 4,097 converters, in test_status",

@@ -285,3 +285,22 @@ def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     answers = ["robot", *[""] * 9, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "", "", "no", "yes", "a"]
     with pytest.raises(InputError, match="answer 24: 'a' already exists"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("- a\n", "robot.yaml is not a specification"),
+        (
+            "project: {name: a}\nblocks: &b\n  - {name: a, middleware: ROS, mode: publisher, message: demo/A}\nx: *b\n",
+            "cannot extend .*robot.yaml: this place is written in a form that can be edited only by hand",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_extended_is_not_changed(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    answers = ["no", "yes", "b", "", "ROS", "publisher", POINT, *[""] * 20]
+    with pytest.raises(InputError, match=message):
+        extend_specification(path, PipeAsker(answers, io.StringIO()), list)
+    assert path.read_text(encoding="utf-8") == text

@@ -62,7 +62,7 @@ def resolve(
     resolver.check_names()
     resolver.resolve_accelerators()
     resolver.resolve_blocks()
-    return Resolved(specification, {**resolver.types}, resolver.blocks, resolver.inputs, resolver.outputs)
+    return Resolved(specification, resolver.types, resolver.blocks, resolver.inputs, resolver.outputs)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Resolved:
     """
 
     specification: Specification
-    types: Mapping[str | None, AcceleratorType]
+    types: Mapping[str, AcceleratorType]
     blocks: Mapping[str, Block]
     inputs: Mapping[str, tuple[MessageSide, ...]]
     outputs: Mapping[str, tuple[MessageSide, ...]]
@@ -81,7 +81,8 @@ class Resolved:
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
         """Yield the topics of all converters and of software in other programs; `names` are from `message_names`."""
         for name, block in self.blocks.items():
-            is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
+            type_ = self._type_of(block)
+            is_elsewhere = type_ is not None and type_.is_elsewhere
             if (block.type is not None and not is_elsewhere) or block.service_block is not None:
                 continue
             for sides, is_published in ((self.inputs, True), (self.outputs, False)):
@@ -111,11 +112,14 @@ class Resolved:
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
         """Return the accelerators' blocks with known types, in hardware or in software."""
         found = [
-            AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
+            AcceleratorBlock(str(block.name), type_, str(block.clock or ""))
             for block in self.blocks.values()
-            if block.type in self.types
+            if (type_ := self._type_of(block))
         ]
         return tuple(block for block in found if block.type.accelerator.is_software is is_software)
+
+    def _type_of(self, block: Block) -> AcceleratorType | None:
+        return self.types.get(block.type) if block.type else None
 
 
 @dataclass

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.vhdl import bits, vhdl_type
+from fusesoc_firm.converter.vhdl import bit, bits, vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
@@ -188,9 +188,9 @@ def _widths(system: DerivedSystem) -> dict[str, int]:
     return {"width": system.width, "lanes": system.width // 8}
 
 
-def _stream(side: str, bit: str, signals: Iterable[str]) -> list[tuple[str, str]]:
-    """Return the map of an AXI4-Stream port; `bit` is "(0)" if the signal for tuser is a single bit."""
-    formals = (f"{side}_axis_{word}{bit if word == 'tuser' else ''}" for word in STREAM)
+def _stream(side: str, index: str, signals: Iterable[str]) -> list[tuple[str, str]]:
+    """Return the map of an AXI4-Stream port; `index` is "(0)" if the signal for tuser is a single bit."""
+    formals = (f"{side}_axis_{word}{index if word == 'tuser' else ''}" for word in STREAM)
     return list(zip(formals, signals, strict=True))
 
 
@@ -204,7 +204,8 @@ def _late_input(names: Names, block: str) -> list[str]:
 
 def _from_manager(number: int) -> list[str]:
     """Return the outputs of the Manager to a subscriber; all subscribers see the same beat."""
-    return [f"sub_axis_{word}{f'({number})' if word in ('tvalid', 'tready') else ''}" for word in STREAM]
+    signals = {word: f"sub_axis_{word}" for word in STREAM}
+    return [*(signals | {word: bit(signals[word], number) for word in ("tvalid", "tready")}).values()]
 
 
 def _to_manager(converter: Converter, system: DerivedSystem) -> list[str]:
@@ -213,7 +214,7 @@ def _to_manager(converter: Converter, system: DerivedSystem) -> list[str]:
     return [
         bits(f"pub_axis_{word}", width * (place + 1) - 1, width * place)
         if (width := widths.get(word))
-        else f"pub_axis_{word}({place})"
+        else bit(f"pub_axis_{word}", place)
         for word in STREAM
     ]
 
@@ -223,18 +224,16 @@ def _own_errors(names: Names, block: str, side: str = "") -> list[tuple[str, str
 
 
 def _system_errors(converter: Converter, system: DerivedSystem) -> list[tuple[str, str]]:
-    error = error_of(converter, system)
-    return [
-        ("frame_error", f"{error['scope']}frame_error({error['bit']})"),
-        ("frame_error_code", f"{error['scope']}frame_error_code({error['high']} downto {error['low']})"),
-    ]
+    number, scope = system.error_blocks.index(converter.block), INNER if system.status else ""
+    code = bits(f"{scope}frame_error_code", ERROR_CODE_BITS * (number + 1) - 1, ERROR_CODE_BITS * number)
+    return [("frame_error", bit(f"{scope}frame_error", number)), ("frame_error_code", code)]
 
 
 def error_of(converter: Converter, system: DerivedSystem) -> dict[str, int | str]:
     """Return the slice of the system's error outputs that reports a converter's errors."""
-    bit = system.error_blocks.index(converter.block)
-    scope = INNER if system.status else ""
-    return {"scope": scope, "bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
+    number, scope = system.error_blocks.index(converter.block), INNER if system.status else ""
+    low = ERROR_CODE_BITS * number
+    return {"scope": scope, "bit": number, "high": low + ERROR_CODE_BITS - 1, "low": low}
 
 
 def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedSystem) -> dict[str, Any]:
@@ -260,7 +259,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
 
 def pin_synchroniser(names: Names, block: AcceleratorBlock, pin: Pin, system: DerivedSystem) -> dict[str, Any]:
     """Return the synchroniser of an input pin, in the clock of its block."""
-    synced, bit = names.synced(block.block, pin.name), "" if pin.bits else "(0)"
+    synced, index = names.synced(block.block, pin.name), "" if pin.bits else "(0)"
     return {
         "synced": synced,
         "type": vhdl_type(pin.bits),
@@ -269,8 +268,8 @@ def pin_synchroniser(names: Names, block: AcceleratorBlock, pin: Pin, system: De
             "entity firm.firm_cdc_sync",
             [
                 ("clk", port_of(system.clock_of(block.block))),
-                (f"level{bit}", names.port(block.block, pin.name)),
-                (f"synced{bit}", synced),
+                (f"level{index}", names.port(block.block, pin.name)),
+                (f"synced{index}", synced),
             ],
             [("BITS", pin.bits)] if pin.bits else (),
         ),
