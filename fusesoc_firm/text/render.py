@@ -69,17 +69,10 @@ _RECORDS: list[dict[str, Rendering]] = []
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
 # A line that is always removed as a whole, regardless of the tag's expansion.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
-# The start of a column, and the minimum number of characters before it.
-_COLUMN = re.compile("\ue002(\\d*)\ue003")
-_PARTED = "\ue004"
-_COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
-_PARTED_KEY = "|!"
+# The start of a column, and the minimum number of characters before it: the tag, and its mark in the text.
+_COLUMN_TAG, _COLUMN = re.compile(r"\{\{\|(\d*)\}\}"), re.compile("\ue002(\\d*)\ue003")
+_PARTED_TAG, _PARTED = "{{|!}}", "\ue004"
 _SUM_KEY = re.compile(r"(?P<name>.+?)(?P<addend>[+-]\d+)")
-
-
-@dataclass(frozen=True)
-class _Literal:
-    text: str
 
 
 @dataclass(frozen=True)
@@ -103,7 +96,7 @@ class _Partial:
     indentation: str
 
 
-_Node = _Literal | _Value | _Section | _Partial
+_Node = str | _Value | _Section | _Partial
 
 
 @dataclass(slots=True)
@@ -137,13 +130,11 @@ class _Scope:
 def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
     """Return the text of `templates/<template_name>.mustache` for `context`.
 
-    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raise
-    `TemplateError`, which names the template, the key and the scope.
+    The template can use only values of the types dict, list, str, int, bool and None. If template and context do not
+    match, raise `TemplateError`, which names the template, the key and the scope.
     """
     try:
-        _require_plain(context, "")
-        expansion = _Expansion(templates, _quotes(template_name))
-        text = _in_columns(expansion.expand(_parse(template_name, templates), _Scope(context), True))
+        text = _in_columns(_expanded(Rendering(template_name, context), templates))
     except TemplateError as error:
         raise TemplateError(f"template {template_name}: {error}") from error
     for renderings in _RECORDS:
@@ -164,13 +155,10 @@ def recorded() -> Iterator[dict[str, Rendering]]:
 
 def traced_lines(rendering: Rendering) -> list[TracedLine]:
     """Return each line of the rendered text, with its origin."""
-    name = rendering.template
-    expansion = _TracedExpansion(TEMPLATES, _quotes(name))
-    marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
-    lines = marked.removesuffix("\n").split("\n")
+    lines = _expanded(rendering, TEMPLATES, is_traced=True).removesuffix("\n").split("\n")
     texts = _in_columns(_MARK.sub("", "\n".join(lines))).split("\n")
     traced: list[TracedLine] = []
-    place = (f"{name}.mustache", 1, "")
+    place = (f"{rendering.template}.mustache", 1, "")
     for line, text in zip(lines, texts, strict=True):
         # The later lines of a multi-line value, and blank lines, have no mark: they share the place of the line above.
         if found := _MARK.search(line):
@@ -184,12 +172,21 @@ def template_text(name: str, templates: Path = TEMPLATES) -> str:
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
 
 
+def _expanded(rendering: Rendering, templates: Path, *, is_traced: bool = False) -> str:
+    """Return the text before its columns are aligned; if `is_traced` is set, each line begins with its place."""
+    # The ending of the name is the template's language: `vhdl/board.vhd`, or `board/pcf`.
+    quotes = QUOTES.get(rendering.template.rpartition("/")[2].rpartition(".")[2], {})
+    expansion = _Expansion(templates, quotes, is_traced)
+    return expansion.expand(_parse(rendering.template, templates, is_traced), _Scope(rendering.context), True)
+
+
 @dataclass(frozen=True)
 class _Expansion:
     """One walk over a parsed template; `quotes` holds the quoting functions of the template's language."""
 
     templates: Path
     quotes: Mapping[str, Quote]
+    is_traced: bool
 
     def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
         """Return the text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
@@ -201,18 +198,12 @@ class _Expansion:
         if isinstance(node, _Value):
             value = _look_up(node.key, scope)
             return self._printed(node, value, scope) if is_taken else ""
-        if isinstance(node, _Literal):
-            return self._literal(node.text, scope)
+        if isinstance(node, str):
+            return node.replace("\ue001", f"{scope.path}\ue001") if self.is_traced else node
         if isinstance(node, _Section):
             return self._section(node, scope, is_taken)
-        text = self.expand(self._parse(f"partials/{node.name}"), scope, is_taken)
+        text = self.expand(_parse(f"partials/{node.name}", self.templates, self.is_traced), scope, is_taken)
         return _indented(text, node.indentation)
-
-    def _parse(self, name: str) -> tuple[_Node, ...]:
-        return _parse(name, self.templates)
-
-    def _literal(self, text: str, _: _Scope) -> str:
-        return text
 
     def _printed(self, node: _Value, value: object, scope: _Scope) -> str:
         number = value if node.addend is None else _sum(value, node, scope)
@@ -242,16 +233,6 @@ class _Expansion:
                 for inner, is_inner_taken in _turns(section, value, scope)
             ]
         )
-
-
-class _TracedExpansion(_Expansion):
-    """A walk over a marked template, which adds the scope's path to the marks."""
-
-    def _parse(self, name: str) -> tuple[_Node, ...]:
-        return _parse_marked(name, self.templates)
-
-    def _literal(self, text: str, scope: _Scope) -> str:
-        return text.replace("\ue001", f"{scope.path}\ue001")
 
 
 def _turns(section: _Section, value: object, scope: _Scope) -> Iterator[tuple[_Scope, bool]]:
@@ -290,11 +271,6 @@ def _look_up(key: str, scope: _Scope) -> object:
             raise TemplateError(f"no '{key}' in {path or 'the context'}; {legal}")
         value, path = value[step], f"{path}.{step}" if path else step
     return value
-
-
-def _quotes(template_name: str) -> Mapping[str, Quote]:
-    """Return the quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
-    return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
 
 
 def _sum(value: object, node: _Value, scope: _Scope) -> int:
@@ -342,44 +318,27 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
         yield ("".join(cells) + row[-1]).rstrip()
 
 
-def _require_plain(value: object, path: str) -> None:
-    """Raise `TemplateError` unless `value` is plain data, since other values could not be printed before rendering."""
-    # Exact types, since a subclass may print differently (an IntEnum does).
-    if value is None or type(value) in (str, int, bool):
-        return
-    if type(value) is list:
-        for number, item in enumerate(value):
-            _require_plain(item, f"{path}[{number}]")
-    elif type(value) is dict:
-        for key, item in value.items():
-            if type(key) is not str:
-                raise TemplateError(f"the key {key!r} in {path or 'the context'} is {_kind(key)}, not a string")
-            _require_plain(item, f"{path}.{key}" if path else key)
-    else:
-        raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
-
-
 @cache
-def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """Return the tree of a template file."""
+def _parse(name: str, templates: Path, is_traced: bool) -> tuple[_Node, ...]:
+    """Return the tree of a template file; if `is_traced` is set, each line that produces output begins with a mark."""
     try:
-        return _tree(name, template_text(name, templates))
+        text = template_text(name, templates)
     except OSError as error:
         raise TemplateError(f"cannot read {name.rpartition('/')[2]}.mustache: {error.strerror}") from error
+    if is_traced:
+        lines = enumerate(text.split("\n"), start=1)
+        text = "\n".join(f"{_mark(name, number, line)}{line}" for number, line in lines)
+    return _tree(name, text)
 
 
-def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
-    """Return the tree of a template file with a mark at the start of every non-blank line that produces output."""
-    lines = template_text(name, templates).split("\n")
-    marked = [
-        line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
-        for number, line in enumerate(lines, start=1)
-    ]
-    return _tree(name, "\n".join(marked))
+def _mark(name: str, number: int, line: str) -> str:
+    is_empty = not line.strip() or _STANDALONE.fullmatch(line)
+    return "" if is_empty else f"\ue000{name}.mustache:{number}:\ue001"
 
 
 def _tree(name: str, text: str) -> tuple[_Node, ...]:
     try:
+        text = _COLUMN_TAG.sub("\ue002\\1\ue003", text.replace(_PARTED_TAG, _PARTED))
         tokens = iter(list(tokenize(text)))
     except ChevronError as error:
         raise TemplateError(f"{name.rpartition('/')[2]}.mustache: {' '.join(str(error).split())}") from error
@@ -392,7 +351,7 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
     for kind, key in tokens:
         match kind:
             case "literal":
-                nodes.append(_Literal(key))
+                nodes.append(key)
             case "variable" | "no escape":
                 nodes.append(_value(key))
             case "section" | "inverted section":
@@ -405,12 +364,8 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
     return tuple(nodes)
 
 
-def _value(key: str) -> _Node:
-    """Return the node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
-    if key == _PARTED_KEY:
-        return _Literal(_PARTED)
-    if column := _COLUMN_KEY.fullmatch(key):
-        return _Literal(f"\ue002{column['least']}\ue003")
+def _value(key: str) -> _Value:
+    """Return the node of a value tag: `x`, `comment x` or `x-1`."""
     quote, _, name = key.rpartition(" ")
     if found := _SUM_KEY.fullmatch(name):
         return _Value(found["name"], quote, int(found["addend"]))
@@ -420,9 +375,9 @@ def _value(key: str) -> _Node:
 def _take_indentation(nodes: list[_Node]) -> str:
     """Remove and return the indentation of the last line in `nodes` if that line is otherwise empty."""
     match nodes:
-        case [*before, _Literal(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
+        case [*before, str(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
             rest, newline, line = text.rpartition("\n")
             if line.isspace():
-                nodes[-1] = _Literal(rest + newline)
+                nodes[-1] = rest + newline
                 return line
     return ""
