@@ -271,7 +271,7 @@ HOSTILE = {
     "tags": "project: {name: !!binary YQ==}\nblocks: !!set {a, b}\n",
     "surrogate": 'project: {name: "\\ud800"}\nblocks: []\n',
     "digits": f"project: {{name: a, width: 0x{'f' * 50_000}}}\nblocks: []\n",
-    "base_60": f"project: {{name: a, width: 1{':1' * 400_000}}}\nblocks: []\n",
+    "base_60": f"project: {{name: a, width: 1{':1' * 2000}}}\nblocks: []\n",
     "deep": f"project: {{name: a}}\nblocks: {'[' * 100_000}\n",
     "control": "project: {name: a}\nblocks: []\n" + "\0" * 300_000,
     "open": "project: {name: a}\nblocks: [" + "x, " * 40_000,

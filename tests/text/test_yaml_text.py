@@ -200,7 +200,7 @@ def test_the_levels_below_an_alias_count() -> None:
         "{{}: a}",
         "9" * 1001,
         f"0x{'f' * 1000}",
-        f"1{':1' * 100_000}",
+        f"1{':1' * 1000}",
     ],
     ids=range(11),
 )
