@@ -32,6 +32,8 @@ from fusesoc_firm.text.naming import distinct_identifiers
 from fusesoc_firm.text.reserved import reserved_names
 
 _TEMPLATES = ("vhdl/system.vhd", "vhdl/test_bench.vhd")
+# The words of a name: a block, and words for one of its ports or for an instance or signal between blocks.
+_Key = tuple[str, ...]
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
 STREAM = ("tdata", "tkeep", "tuser", "tvalid", "tlast", "tready")
 # The reset of clk's domain.
@@ -57,50 +59,13 @@ class Names:
     """The signals of all ports of all blocks, the signals of instances between blocks, and the labels."""
 
     def __init__(self, system: DerivedSystem) -> None:
-        found = blocks(system)
-        forks = [(item.source, fork) for item in system.connections for fork in forked(item)]
-        buffered = [item.block for item in system.publishers if item.buffer]
-        queued = [item.block for item in system.subscribers if item.queue]
-        labels: list[tuple[str, ...]] = [("u", block) for block, _ in found]
-        labels += [("u", *_fork_key(end, fork, "fork")) for end, fork in forks]
-        labels += [
-            ("u", item.source.block, item.source.prefix, "length")
-            for item in system.connections
-            if item.length and item.length.source is LengthSource.COMPUTED
-        ]
-        labels += [("u", block, "buffer") for block in buffered]
-        labels += [("u", item.block, queue_word(item.queue)) for item in system.subscribers if item.queue]
-        late = [item.block for item in system.publishers if item.late_bytes]
-        labels += [("u", block, "late") for block in late]
-        synchronised = [(block.block, str(pin.name)) for block, pin in synchronised_pins(system)]
-        labels += [("u", *pin, "sync") for pin in synchronised]
-        labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
+        labels = [*_labels(system)]
         label_names = distinct_identifiers(labels, taken_names())
         self._labels = dict(zip(labels, label_names, strict=True))
-
-        entities = {subscriber_entity(item.frame, item.suffix) for item in system.subscribers}
-        entities |= {publisher_entity(item.frame, item.suffix) for item in system.publishers}
-        entities |= {item.entity for item in system.accelerator_types}
-        entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
-        reserved = {*taken_names(), system.entity, *entities, *label_names, *clock_names(system)}
-        # Keys of instances between blocks have three parts, so such a key never equals the key of a field.
-        ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
-        signals: list[tuple[str, ...]] = [
-            _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
-        ]
-        signals += [(block, "", word) for block in (*queued, *buffered) for word in FRAME_SIGNALS]
-        watched = publishers_with_watchdog(system)
-        signals += [(item.block, "", f"frame_{word}") for item in watched for word in ERROR_WORDS]
-        signals += [(block, "", f"late_{word}") for block in late for word in LATE_WORDS]
-        signals += [(*pin, "synced") for pin in synchronised]
-        signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
-        signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
+        reserved = {*taken_names(), system.entity, *_entities(system), *label_names, *clock_names(system)}
         # Pins are named first, so that they get the requested names.
-        pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
-        keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
-        self._signals: Mapping[tuple[str, ...], str] = dict(
-            zip(keys, distinct_identifiers(keys, reserved), strict=True)
-        )
+        keys = [*_pins(system), *_ports(system), *_signals(system)]
+        self._signals: Mapping[_Key, str] = dict(zip(keys, distinct_identifiers(keys, reserved), strict=True))
 
     def label(self, *words: str) -> str:
         """Return the label of a block, or of an instance identified by further words."""
@@ -146,6 +111,60 @@ class Names:
     def late(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its FIFO for late frames."""
         return self._signals[block, "", f"late_{signal}"]
+
+
+def _entities(system: DerivedSystem) -> Iterator[str]:
+    """Yield the names of all entities that are generated for the system or written for it."""
+    yield from (subscriber_entity(item.frame, item.suffix) for item in system.subscribers)
+    yield from (publisher_entity(item.frame, item.suffix) for item in system.publishers)
+    yield from (item.entity for item in system.accelerator_types)
+    yield from (length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items())
+
+
+def _labels(system: DerivedSystem) -> Iterator[_Key]:
+    """Yield the words of the labels of all instances."""
+    yield from (("u", block) for block, _ in blocks(system))
+    yield from (("u", *_fork_key(end, fork, "fork")) for end, fork in _forks(system))
+    for item in system.connections:
+        if item.length and item.length.source is LengthSource.COMPUTED:
+            yield "u", item.source.block, item.source.prefix, "length"
+    yield from (("u", item.block, "buffer") for item in system.publishers if item.buffer)
+    yield from (("u", item.block, queue_word(item.queue)) for item in system.subscribers if item.queue)
+    yield from (("u", item.block, "late") for item in system.publishers if item.late_bytes)
+    yield from (("u", block.block, str(pin.name), "sync") for block, pin in synchronised_pins(system))
+    for crossing in all_crossings(system):
+        yield from (("u", *_crossing_key(crossing, word)) for word in crossing.instances())
+
+
+def _pins(system: DerivedSystem) -> Iterator[_Key]:
+    return ((block.block, str(pin.name)) for block in system.accelerators for pin in block.type.accelerator.pins)
+
+
+def _ports(system: DerivedSystem) -> Iterator[_Key]:
+    return ((block, f"{prefix}{port.name}") for block, sides in blocks(system) for prefix, port in sides)
+
+
+def _signals(system: DerivedSystem) -> Iterator[_Key]:
+    """Yield the words of the signals at instances between blocks; three or more, so that no port has the same ones."""
+    for end, fork in _forks(system):
+        yield from (_fork_key(end, fork, word) for word in _fork_words(fork))
+    queued = [item.block for item in system.subscribers if item.queue]
+    buffered = [item.block for item in system.publishers if item.buffer]
+    for block in (*queued, *buffered):
+        yield from ((block, "", word) for word in FRAME_SIGNALS)
+    for item in publishers_with_watchdog(system):
+        yield from ((item.block, "", f"frame_{word}") for word in ERROR_WORDS)
+    for item in system.publishers:
+        if item.late_bytes:
+            yield from ((item.block, "", f"late_{word}") for word in LATE_WORDS)
+    yield from ((block.block, str(pin.name), "synced") for block, pin in synchronised_pins(system))
+    yield from (_length_key(item.source) for item in system.connections if is_found_out(item))
+    for crossing in all_crossings(system):
+        yield from (_crossing_key(crossing, word) for word, _ in crossing.signals())
+
+
+def _forks(system: DerivedSystem) -> Iterator[tuple[End, Handshake]]:
+    return ((item.source, fork) for item in system.connections for fork in forked(item))
 
 
 def queue_word(queue: Queue) -> str:
