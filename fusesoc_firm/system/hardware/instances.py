@@ -39,9 +39,7 @@ INNER = "inner_"
 def subscriber_instances(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
     """Return a subscriber, with its queue or watchdog between the Manager and the subscriber."""
     block, queue = converter.block, converter.queue
-    frame = _stream("s", "", _from_manager(converter.id))
-    if queue:
-        frame = _stream("s", "", _frame_signals(names.frame, block))
+    source = _frame_signals(names.frame, block) if queue else _from_manager(converter.id)
     ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
     return {
         **_head(converter),
@@ -50,7 +48,7 @@ def subscriber_instances(names: Names, converter: Converter, system: DerivedSyst
             f"entity work.{subscriber_entity(converter.frame, converter.suffix)}",
             [
                 *_CLOCK,
-                *frame,
+                *_stream("s", "", source),
                 *((port.name, names.port(block, port.name)) for port in ports),
                 *(_own_errors(names, block) if queue else _system_errors(converter, system)),
             ],
@@ -63,13 +61,15 @@ def subscriber_instances(names: Names, converter: Converter, system: DerivedSyst
 def _queue(names: Names, converter: Converter, queue: Queue, system: DerivedSystem) -> dict[str, Any]:
     """Return the queue or the watchdog before a subscriber, with the signals between it and the subscriber."""
     block, word = converter.block, queue_word(queue)
-    unit, generics = ("queue", _memory(queue, system)) if not queue.limit else ("sink_watchdog", _limit(queue, system))
+    entity, generics = "firm_axis_queue", _memory(queue, system)
+    if queue.limit:
+        entity, generics = "firm_axis_sink_watchdog", [("WIDTH", system.width), ("LIMIT", queue.limit)]
     return {
         **_frame(names, block, system),
         "unit": word,
         "instance": instance(
             names.label(block, word),
-            f"entity firm.firm_axis_{unit}",
+            f"entity firm.{entity}",
             [
                 *_CLOCK,
                 *_stream("s", "", _from_manager(converter.id)),
@@ -80,10 +80,6 @@ def _queue(names: Names, converter: Converter, queue: Queue, system: DerivedSyst
             generics,
         ),
     }
-
-
-def _limit(queue: Queue, system: DerivedSystem) -> list[tuple[str, object]]:
-    return [("WIDTH", system.width), ("LIMIT", queue.limit)]
 
 
 def _memory(queue: Queue, system: DerivedSystem) -> list[tuple[str, object]]:
