@@ -32,7 +32,6 @@ _MOST_REPARSED = 2**17
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
-_SURROGATE = re.compile("[\ud800-\udfff]")
 _MOST_CONTROL_CHARACTERS = 200
 # The errors that PyYAML reports for a line whose indentation does not match any line above.
 _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
@@ -100,13 +99,6 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
         if anchor and not is_alias:
             self._sizes[anchor] = _Size(self._nodes - nodes, self._deepest - self._level)
         self._deepest = max(deepest, self._deepest)
-        return node
-
-    def compose_scalar_node(self, anchor: Any) -> yaml.ScalarNode:
-        node = super().compose_scalar_node(anchor)
-        if not node.value.isascii() and (found := _SURROGATE.search(node.value)):
-            problem = f"\\u{ord(found[0]):04x} is half of a character"
-            raise yaml.composer.ComposerError(None, None, problem, node.start_mark)
         return node
 
     def _alias_size(self, anchor: str, mark: Any) -> _Size:
@@ -207,12 +199,17 @@ def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL
 
 
 def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
-    """Report the first control character of each line."""
-    lines = ((number, line, _CONTROL_CHARACTERS.search(line)) for number, line in enumerate(LINE_END.split(text), 1))
-    for number, line, found in islice((item for item in lines if item[2]), _MOST_CONTROL_CHARACTERS):
-        assert found
-        message = f"invalid YAML: it contains the control character 0x{ord(found[0]):02x}"
-        faults.error(message, SourceRef(file, number, found.start() + 1, _CONTROL_CHARACTERS.sub("?", line)))
+    for found, source in islice(_control_characters(text, file), _MOST_CONTROL_CHARACTERS):
+        faults.error(f"invalid YAML: it contains the control character 0x{ord(found):02x}", source)
+
+
+def _control_characters(text: str, file: str) -> Iterator[tuple[str, SourceRef]]:
+    """Yield each control character with its place."""
+    for number, line in enumerate(LINE_END.split(text), 1):
+        if _CONTROL_CHARACTERS.search(line):
+            shown = _CONTROL_CHARACTERS.sub("?", line)
+            for found in _CONTROL_CHARACTERS.finditer(line):
+                yield found[0], SourceRef(file, number, found.start() + 1, shown)
 
 
 def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...], faults: Diagnostics) -> None:

@@ -92,8 +92,17 @@ def test_items_come_once() -> None:
         ("a: b\n---\nc: d\n", ["a.yaml:2:1: error: invalid YAML: but found another document"]),
         ("a: &b [*b]", ["a.yaml:1:8: error: invalid YAML: the alias '*b' is inside its own value"]),
         ("&a\nb: {c: *a}", ["a.yaml:2:8: error: invalid YAML: the alias '*a' is inside its own value"]),
-        ('a: "b\\udc00"', ["a.yaml:1:4: error: invalid YAML: \\udc00 is half of a character"]),
-        ("a: \x01\x02", ["a.yaml:1:4: error: invalid YAML: it contains the control character 0x01"]),
+        (
+            "a: \x01\x02",
+            [
+                "a.yaml:1:4: error: invalid YAML: it contains the control character 0x01",
+                "a.yaml:1:5: error: invalid YAML: it contains the control character 0x02",
+            ],
+        ),
+        (
+            "a: " + "\x01" * 300,
+            [f"a.yaml:1:{4 + n}: error: invalid YAML: it contains the control character 0x01" for n in range(200)],
+        ),
         ("a: @b", ["a.yaml:1:4: error: invalid YAML: found character '@' that cannot start any token"]),
         (
             "a: b\x01\nc: \x00[\n",
