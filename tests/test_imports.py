@@ -19,7 +19,8 @@ PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
 ALLOWED: dict[str, str] = {
     "text": "",
     "tools": "text",
-    "message": "text tools",
+    "storage": "text",
+    "message": "storage text tools",
     "core": "message text tools",
     "frame": "message text",
     "converter": "core frame message text tools",

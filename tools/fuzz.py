@@ -24,7 +24,7 @@ CAMPAIGNS: Mapping[str, Sequence[str]] = {
     "frames": ("converter", "system", "cores", "applications", "runs/verify"),
     "packets": ("fabric", "wiznet"),
     "messages": ("frame", "message", "middleware", "errors", "text"),
-    "bags": ("runs/bags", "runs/replay"),
+    "bags": ("storage", "runs/bags", "runs/replay"),
 }
 # Of random netlists in a round.
 DESIGNS = 200

@@ -4,15 +4,16 @@
         for recorded in bag.messages(topics):
             ...
 
-The formats are ROS 1 bags, and ROS 2 bags in sqlite3 or MCAP, with or without compression. Only a bag's index is held
-in memory. Payloads are returned as recorded and are not decoded. `definitions_in` returns the definitions that a bag
-contains.
+The formats are ROS 1 bags, and ROS 2 bags in sqlite3 or MCAP, with or without compression. A bag is read once when it
+is opened, and compared with what it says about itself; only the index of its messages is held in memory. Payloads are
+returned as recorded and are not decoded. `definitions_in` returns the definitions that a bag contains.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import struct
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
@@ -20,36 +21,26 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.rosbag1 import Reader as Rosbag1Reader
-from rosbags.rosbag2 import Reader as Rosbag2Reader
-from rosbags.rosbag2.reader import DirectoryReader
-from rosbags.rosbag2.storage_mcap import McapReader
+import numpy as np
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.joint import separate_texts
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.storage.bag_files import Metadata, check_own_metadata, is_bag, opened, parts_of
+from fusesoc_firm.storage.compression import ZSTD_MAGIC, message
+from fusesoc_firm.storage.contents import BagFile, Channel, Contents, DamageError
+from fusesoc_firm.storage.mcap import McapFile
+from fusesoc_firm.storage.ros1 import Ros1File
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.tools.reads import in_part
 
-Reader = Rosbag1Reader | Rosbag2Reader
+__all__ = ["BAGS", "Bag", "BagDefinitions", "Foreign", "Form", "Recorded", "Stream", "bag_files", "is_bag"]
 
-BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file"
-_SUFFIXES = (".bag", ".mcap", ".db3")
-_METADATA = "metadata.yaml"
-_ROS1_MAGIC = b"#ROSBAG"
-_SQLITE_MAGIC = b"SQLite format 3\0"
-_SQLITE_HEADER_BYTES = 100
-# The errors that rosbags reports for a damaged bag, and the remedy for each.
-_REMEDIES = {
-    "not indexed": "the bag was not closed; run: rosbag reindex {path}",
-    "index looks damaged": "the bag is cut off; run: rosbag reindex {path}",
-    "are still in the journal": "the bag was not closed; run: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
-    "the file is cut off": "copy the bag again, or recover the rest; run: sqlite3 FILE .recover",
-    "end magic is invalid": "the bag was not closed or is cut off; run: mcap recover {path}",
-}
+BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file, which may be compressed (.zstd)"
+_ENCODINGS = {"cdr": ROS2, "ros1": ROS1}
+_LANGUAGES = {"ros1msg": ROS1, "ros2msg": ROS2}
 
 
 class Form(Enum):
@@ -78,6 +69,20 @@ class Stream(NamedTuple):
     definition: str
 
 
+@dataclass(frozen=True)
+class Foreign:
+    """A channel whose messages are not those of the bag's ROS version: its number of messages, and the reason."""
+
+    topic: str
+    type: str
+    count: int
+    reason: str
+
+    def __str__(self) -> str:
+        """Return a line for users."""
+        return f"{self.topic}: {self.reason}"
+
+
 class Recorded(NamedTuple):
     """A recorded message; `number` counts the messages of a topic from 0, and `stamp` is in ns."""
 
@@ -87,15 +92,28 @@ class Recorded(NamedTuple):
     payload: bytes
 
 
+class _Part(NamedTuple):
+    """A file of a bag: its name, its contents, and the streams of its channels by their ids."""
+
+    path: Path
+    file: BagFile
+    contents: Contents
+    streams: Mapping[int, Stream]
+
+
 @dataclass(frozen=True)
 class Bag:
-    """An open bag: its format, the number of messages in each stream, and the start time in ns."""
+    """An open bag: its format, the number of messages in each stream, the start time in ns, and foreign channels.
+
+    A bag of ROS 1 messages in MCAP has the format ROS 1.
+    """
 
     path: Path
     form: Form
     streams: Mapping[Stream, int]
     start: int
-    _readers: Sequence[Reader] = field(repr=False)
+    foreign: Sequence[Foreign]
+    _parts: Sequence[_Part] = field(repr=False)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
         """Yield the messages of `topics` in the order of their times, up to but not including `stop` (in ns).
@@ -103,19 +121,32 @@ class Bag:
         Raise `InputError` if the bag is damaged.
         """
         numbers: dict[str, int] = {}
-        for reader in self._readers:
-            connections = [item for item in reader.connections if item.topic in topics]
-            if not connections:
-                continue  # rosbags reads all topics if the list is empty
-            found = reader.messages(connections, stop=stop)
-            while True:
-                with _readable(self.path):
-                    item = next(found, None)
-                if item is None:
-                    break
-                connection, stamp, payload = item
-                number = numbers[connection.topic] = numbers.get(connection.topic, -1) + 1
-                yield Recorded(_stream(connection), number, stamp, bytes(payload))
+        for part, row in self._ordered(topics, stop):
+            index = part.contents.index
+            stream = part.streams[index.channels[row]]
+            with _readable(self.path, part.path, part.file.remedy):
+                payload = part.file.payload(index.chunks[row], index.starts[row], index.sizes[row])
+                if self.form.ros is ROS2 and payload.startswith(ZSTD_MAGIC):
+                    # The recorder compresses single messages on request. Others begin with a zero.
+                    payload = message(payload)
+            number = numbers[stream.topic] = numbers.get(stream.topic, -1) + 1
+            yield Recorded(stream, number, index.stamps[row], payload)
+
+    def _ordered(self, topics: Collection[str], stop: int | None) -> Iterator[tuple[_Part, int]]:
+        """Yield the parts and the rows in their indexes of the messages of `topics`, by time."""
+        rows, stamps, parts = [], [], []
+        for number, part in enumerate(self._parts):
+            wanted = [channel for channel, stream in part.streams.items() if stream.topic in topics]
+            times = np.array(part.contents.index.stamps, dtype=np.uint64)
+            is_wanted = np.isin(np.array(part.contents.index.channels, dtype=np.int64), wanted)
+            if stop is not None:
+                is_wanted &= times < np.uint64(max(0, stop))
+            rows.append(np.flatnonzero(is_wanted))
+            stamps.append(times[is_wanted])
+            parts.append(np.full(len(rows[-1]), number))
+        row, part_of = np.concatenate(rows), np.concatenate(parts)
+        for position in np.argsort(np.concatenate(stamps), kind="stable"):
+            yield self._parts[part_of[position]], int(row[position])
 
 
 @dataclass(frozen=True)
@@ -124,13 +155,6 @@ class BagDefinitions:
 
     ros: Middleware
     texts: Mapping[MessageName, tuple[str, ...]]
-
-
-def is_bag(path: Path) -> bool:
-    """Return whether a path is a bag, according to the file's name or the folder's contents."""
-    if path.is_dir():
-        return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
-    return path.suffix in _SUFFIXES and path.is_file()
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -157,103 +181,101 @@ def _state(file: Path) -> tuple[str, int, int]:
 @lru_cache(maxsize=4)
 def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> BagDefinitions:
     """Cache `definitions_in`, since every library of a process needs the result; `_states` invalidates the cache."""
+    channels: list[Channel] = []
+    with _readable(path):
+        parts = parts_of(path)
+    for part in parts:
+        with _readable(path, part), opened(part) as file, _readable(path, part, file.remedy):
+            channels += file.channels().values()
+    ros = _spoken(channels)
     texts: dict[MessageName, dict[str, None]] = {}
-    with open_bag(path) as bag:
-        for stream in bag.streams:
-            if stream.definition:
-                with suppress(InputError):  # a type whose name is not allowed in a specification
-                    for name, text in separate_texts(parse_name(stream.type), stream.definition).items():
-                        texts.setdefault(name, {})[text] = None
-        return BagDefinitions(bag.form.ros, {name: tuple(found) for name, found in texts.items()})
+    for stream in (_stream(channel) for channel in channels if _ENCODINGS.get(channel.encoding) is ros):
+        if stream.definition:
+            with suppress(InputError):  # a type whose name is not allowed in a specification
+                for name, text in separate_texts(parse_name(stream.type), stream.definition).items():
+                    texts.setdefault(name, {})[text] = None
+    return BagDefinitions(ros, {name: tuple(found) for name, found in texts.items()})
 
 
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
-    """Open a bag for reading within the context. Raise `InputError`, with `hint` for a path that is not a bag."""
-    with ExitStack() as stack:
-        with _readable(path, hint):
-            _check_databases(path)
-            readers = _readers(path)
-            for reader in readers:
-                stack.enter_context(reader)
-            streams: dict[Stream, int] = {}
-            for connection in (item for reader in readers for item in reader.connections):
-                stream = _stream(connection)
-                streams[stream] = streams.get(stream, 0) + connection.msgcount
-            bag = Bag(path, _form(readers[0]), streams, min(reader.start_time for reader in readers), readers)
-        yield bag
+    """Open a bag for reading within the context.
 
-
-def _readers(path: Path) -> list[Reader]:
-    if path.is_dir() and not (path / _METADATA).exists():
-        # A recorder writes the metadata file last. Without it, the finished part of the bag is still readable.
-        files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
-        if not files:
-            raise FileNotFoundError("the folder contains neither metadata.yaml nor a .db3 or .mcap file")
-        return [Rosbag2Reader(file) for file in files]
-    return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
-
-
-def _check_databases(path: Path) -> None:
-    """Raise `ValueError` if messages are missing from an SQLite file: still in the journal, or cut off.
-
-    rosbags would miss messages in the journal, and would read zeros in place of a missing end.
+    Raise `InputError` if the bag is damaged or lacks messages that it says it has, and, with `hint`, for a path that is
+    not a bag.
     """
-    for file in path.glob("*.db3") if path.is_dir() else [path]:
-        journal = file.with_name(f"{file.name}-wal")
-        if journal.exists() and journal.stat().st_size:
-            raise ValueError(f"messages of {file.name} are still in the journal {journal.name}")
-        size, expected = file.stat().st_size, _database_size(file)
-        if size < expected:
-            raise ValueError(f"the file is cut off: {file.name} has {size} of {expected} bytes")
+    with ExitStack() as stack:
+        with _readable(path, hint=hint):
+            if not path.exists():
+                raise DamageError(f"{path} does not exist")
+            names = parts_of(path)
+            metadata = Metadata.beside(path) if path.is_dir() else None
+        found = []
+        for name in names:
+            with _readable(path, name, hint):
+                file = stack.enter_context(opened(name))
+            with _readable(path, name, file.remedy):
+                contents = file.scan()
+                if len(names) == 1 and metadata is None:
+                    check_own_metadata(file, contents)
+                found.append((name, file, contents))
+        with _readable(path):
+            if metadata:
+                metadata.check([contents for _, _, contents in found])
+        yield _bag(path, found)
 
 
-def _database_size(file: Path) -> int:
-    """Return the size in bytes according to a file's header (SQLite's file format, 1.3), or 0 if it is unknown."""
-    with file.open("rb") as opened:
-        header = opened.read(_SQLITE_HEADER_BYTES)
-    is_known = len(header) == _SQLITE_HEADER_BYTES and header.startswith(_SQLITE_MAGIC)
-    # If these numbers differ, an old writer has not updated the number of pages.
-    if not is_known or header[24:28] != header[92:96]:
-        return 0
-    # 65,536 does not fit and is encoded as 1.
-    page_bytes = int.from_bytes(header[16:18], "big")
-    return int.from_bytes(header[28:32], "big") * (65536 if page_bytes == 1 else page_bytes)
+def _bag(path: Path, found: Sequence[tuple[Path, BagFile, Contents]]) -> Bag:
+    ros = _spoken(channel for _, _, contents in found for channel in contents.channels.values())
+    parts, streams, foreign = [], Counter[Stream](), Counter[tuple[str, str, str]]()
+    for name, file, contents in found:
+        counts, own = Counter(contents.index.channels), {}
+        for key, channel in contents.channels.items():
+            if reason := _foreign(channel, ros):
+                foreign[channel.topic, channel.type, reason] += counts[key]
+            else:
+                own[key] = _stream(channel)
+                streams[own[key]] += counts[key]
+        parts.append(_Part(name, file, contents, own))
+    start = min((stamp for part in parts for stamp in part.contents.index.stamps), default=0)
+    others = [Foreign(topic, type_, count, reason) for (topic, type_, reason), count in foreign.items()]
+    return Bag(path, _form(ros, parts[0].file), streams, start, others, parts)
 
 
-def _is_ros1(path: Path) -> bool:
-    if path.is_dir() or path.suffix == ".bag":
-        return path.suffix == ".bag"
-    with path.open("rb") as file:
-        return file.read(len(_ROS1_MAGIC)) == _ROS1_MAGIC
+def _spoken(channels: Iterable[Channel]) -> Middleware:
+    """Return the ROS version of a bag: ROS 1 if it has channels of ROS 1 alone."""
+    return ROS1 if {_ENCODINGS[item.encoding] for item in channels if item.encoding in _ENCODINGS} == {ROS1} else ROS2
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Return a sort key that orders `bag_10` after `bag_9`."""
-    return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
+def _foreign(channel: Channel, ros: Middleware) -> str:
+    """Return the reason why a channel is foreign to a bag, or an empty text."""
+    if channel.encoding not in _ENCODINGS:
+        return f"its messages are in '{channel.encoding}', not in {' or '.join(_ENCODINGS)}"
+    if _ENCODINGS[channel.encoding] is not ros:
+        return f"its messages are those of {_ENCODINGS[channel.encoding].title}, in a bag of {ros.title}"
+    return "" if channel.type else "it has no schema that names the type of its messages"
 
 
-def _form(reader: Reader) -> Form:
-    if isinstance(reader, Rosbag1Reader):
+def _form(ros: Middleware, file: BagFile) -> Form:
+    if ros is ROS1 or isinstance(file, Ros1File):
         return Form.ROS1
-    storage = reader.storage
-    if isinstance(storage, DirectoryReader) and storage.storages:
-        storage = storage.storages[0]
-    return Form.MCAP if isinstance(storage, McapReader) else Form.SQLITE3
+    return Form.MCAP if isinstance(file, McapFile) else Form.SQLITE3
 
 
-def _stream(connection: Connection) -> Stream:
-    is_text = connection.msgdef.format is MessageDefinitionFormat.MSG
-    definition = connection.msgdef.data if is_text else ""
-    return Stream(connection.topic, connection.msgtype, connection.digest, definition)
+def _stream(channel: Channel) -> Stream:
+    is_text = _LANGUAGES.get(channel.language) is _ENCODINGS[channel.encoding]
+    return Stream(channel.topic, channel.type, channel.digest, channel.definition if is_text else "")
 
 
 @contextmanager
-def _readable(path: Path, hint: str = "") -> Iterator[None]:
-    """Convert any exception that a damaged file causes in rosbags to `InputError`."""
+def _readable(path: Path, part: Path | None = None, hint: str = "") -> Iterator[None]:
+    """Convert the exceptions that a damaged file causes to `InputError`, which names the bag and its part."""
+    name = f"{part.name}: " if part and part != path else ""
     try:
         yield
-    except Exception as error:  # noqa: BLE001 - rosbags and its dependencies raise anything
-        said = str(error) or type(error).__name__
-        remedies = (text.format(path=path) for words, text in _REMEDIES.items() if words in said)
-        fail(f"{path} is not a readable bag: {said}", hint=next(remedies, hint))
+    except DamageError as error:
+        fail(f"{path} is not a readable bag: {name}{error}", hint=error.remedy or hint)
+    except OSError as error:
+        fail(f"{path} is not a readable bag: {name}{error.strerror or error}", hint=hint)
+    except (struct.error, ValueError, OverflowError, MemoryError) as error:
+        fail(f"{path} is not a readable bag: {name}its data are damaged: {error}", hint=hint)

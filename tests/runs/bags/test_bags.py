@@ -141,7 +141,9 @@ def test_a_database_whose_last_page_is_incomplete(tmp_path: Path, page_bytes: in
     cut(path, 1 - missing / size)
     left = file.stat().st_size
     for bag in (path, file):
-        with pytest.raises(InputError, match=rf"cut off: recorded\.db3 has {left} of {size} bytes\n.*sqlite3 FILE"):
+        with pytest.raises(
+            InputError, match=rf"cut off: it has {left} of {size} bytes\n.*sqlite3 .*recorded\.db3 \.recover"
+        ):
             read_x(bag, "sqlite3")
 
 
@@ -247,7 +249,10 @@ def test_a_bag_of_ros1_is_known_by_its_beginning(tmp_path: Path) -> None:
     ("kind", "hint"),
     [
         ("ros1", "the bag was not closed; run: rosbag reindex {path}"),
-        ("mcap", "the bag was not closed or is cut off; run: mcap recover"),
+        (
+            "mcap",
+            "not closed or is cut off\n      = copy the file again, or keep the rest; run: mcap recover {path}/a.mcap",
+        ),
     ],
 )
 def test_a_bag_that_was_not_closed(tmp_path: Path, kind: str, hint: str) -> None:
