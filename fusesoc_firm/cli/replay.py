@@ -97,7 +97,8 @@ def _replay(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.bag_reader import Form
     from fusesoc_firm.node.engine.watch import Control
     from fusesoc_firm.node.transport.simulator import Simulator
-    from fusesoc_firm.runs.replay.command import Settings, Source, Target, replay
+    from fusesoc_firm.runs.replay.command import replay
+    from fusesoc_firm.runs.replay.options import Settings, Source, Target
 
     def start() -> Simulator:
         built = built_simulator(arguments)

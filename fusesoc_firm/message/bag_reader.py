@@ -222,10 +222,10 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
         with _readable(path):
             if metadata:
                 metadata.check([contents for _, _, contents in found])
-        yield _bag(path, found)
+        yield _bag(path, found, metadata.digests if metadata else {})
 
 
-def _bag(path: Path, found: Sequence[tuple[Path, BagFile, Contents]]) -> Bag:
+def _bag(path: Path, found: Sequence[tuple[Path, BagFile, Contents]], digests: Mapping[tuple[str, str], str]) -> Bag:
     ros = _spoken(channel for _, _, contents in found for channel in contents.channels.values())
     parts, streams, foreign = [], Counter[Stream](), Counter[tuple[str, str, str]]()
     for name, file, contents in found:
@@ -234,7 +234,8 @@ def _bag(path: Path, found: Sequence[tuple[Path, BagFile, Contents]]) -> Bag:
             if reason := _foreign(channel, ros):
                 foreign[channel.topic, channel.type, reason] += counts[key]
             else:
-                own[key] = _stream(channel)
+                digest = channel.digest or digests.get((channel.topic, channel.type), "")
+                own[key] = _stream(channel._replace(digest=digest))
                 streams[own[key]] += counts[key]
         parts.append(_Part(name, file, contents, own))
     start = min((stamp for part in parts for stamp in part.contents.index.stamps), default=0)

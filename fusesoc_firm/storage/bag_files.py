@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Any
 
 import yaml
 
@@ -72,12 +71,16 @@ def opened(path: Path) -> Iterator[BagFile]:
 
 @dataclass(frozen=True)
 class Metadata:
-    """The metadata of a bag of ROS 2: the names of its files, and the numbers of messages by topic and type."""
+    """The metadata of a bag of ROS 2: the names of its files, and the numbers of messages by topic and type.
+
+    `digests` are the hashes of types, which files of MCAP lack.
+    """
 
     name: str
     remedy: str
     files: Sequence[str]
     counts: Mapping[tuple[str, str], int]
+    digests: Mapping[tuple[str, str], str]
     total: int
 
     @classmethod
@@ -97,20 +100,23 @@ class Metadata:
     @classmethod
     def of(cls, text: str, name: str, remedy: str) -> Metadata:
         """Return the metadata in a text. Raise `DamageError` if they are damaged."""
+        counts: Counter[tuple[str, str]] = Counter()
+        digests = {}
         try:
             data = yaml_data(text)
             # In a file of messages, this level is missing.
             found = data.get(_INFORMATION, data)
-            topics = [_topic(item) for item in found["topics_with_message_count"] or []]
-            files = [str(name) for name in found["relative_file_paths"] or []]
+            for item in found["topics_with_message_count"] or []:
+                topic = item["topic_metadata"]
+                key = str(topic["name"]), str(topic["type"])
+                counts[key] += int(item["message_count"])
+                digests[key] = str(topic.get("type_description_hash") or "")
+            files = [str(file) for file in found["relative_file_paths"] or []]
             total = int(found["message_count"])
         except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
             said = f"the key {error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())
             raise DamageError(f"{name} is damaged: {said}", remedy) from error
-        counts: Counter[tuple[str, str]] = Counter()
-        for key, count in topics:
-            counts[key] += count
-        return cls(name, remedy, files, counts, total)
+        return cls(name, remedy, files, counts, digests, total)
 
     def check(self, contents: Sequence[Contents]) -> None:
         """Raise `DamageError` if the bag's files have other numbers of messages."""
@@ -137,11 +143,6 @@ def check_own_metadata(file: BagFile, contents: Contents) -> None:
         # A recorder that still runs, or that has begun another file, has written those of an earlier time.
         if len(metadata.files) == 1 and metadata.total:
             metadata.check([contents])
-
-
-def _topic(item: Mapping[str, Any]) -> tuple[tuple[str, str], int]:
-    topic = item["topic_metadata"]
-    return (str(topic["name"]), str(topic["type"])), int(item["message_count"])
 
 
 def _kind(file: Path) -> type[BagFile]:

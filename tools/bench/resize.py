@@ -17,7 +17,8 @@ from rosbags.typesys.store import Typestore
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.node.transport.built_simulator import CoreSources, build_simulator
 from fusesoc_firm.node.transport.simulator import Simulator
-from fusesoc_firm.runs.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.runs.replay.command import replay
+from fusesoc_firm.runs.replay.options import Settings, Source, Target
 from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.text.diagnostics import InputError
 from tests.applications.images import load_model

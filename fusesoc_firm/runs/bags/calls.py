@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream, open_bag
+from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind
 from fusesoc_firm.runs.bags.events import EVENTS, Events, EventType, Key, events_in
 from fusesoc_firm.system.derived.model import Service, ServiceEnd, absolute_name
-from fusesoc_firm.text.diagnostics import InputError
 
 # A request without a response is given up after this number of later requests.
 _MOST_WAITING = 100
@@ -84,23 +82,21 @@ class BagOfCalls(Bag):
         """Yield each exchange with a service that the hardware calls, in the order of the requests.
 
         `block` is the block of the requests. Requests are recorded from `first` on, and all messages before `stop` (in
-        ns). Events after damaged data are ignored; the replay reports the damage.
+        ns).
         """
         stream, calls = self.asked[block]
         waiting: dict[Key, Exchange] = {}
-        # In some bags, a shared reader would change the position of the replay.
-        with suppress(InputError), open_bag(self.path) as bag:
-            for recorded in bag.messages([stream.topic], stop):
-                part = calls.events.part_of(recorded) if recorded.stream == stream else None
-                if part is None:
-                    continue
-                key, request, response = part
-                if request is not None and recorded.stamp >= first:
-                    waiting[key] = Exchange(recorded.stamp, request, None)
-                elif key in waiting:
-                    waiting[key] = waiting[key]._replace(response=response)
-                while waiting and (_first(waiting).response is not None or len(waiting) > _MOST_WAITING):
-                    yield waiting.pop(next(iter(waiting)))
+        for recorded in super().messages([stream.topic], stop):
+            part = calls.events.part_of(recorded) if recorded.stream == stream else None
+            if part is None:
+                continue
+            key, request, response = part
+            if request is not None and recorded.stamp >= first:
+                waiting[key] = Exchange(recorded.stamp, request, None)
+            elif key in waiting:
+                waiting[key] = waiting[key]._replace(response=response)
+            while waiting and (_first(waiting).response is not None or len(waiting) > _MOST_WAITING):
+                yield waiting.pop(next(iter(waiting)))
         yield from waiting.values()
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ from fusesoc_firm.message.bag_reader import Bag, Recorded, Stream
 from fusesoc_firm.message.middleware import MessageDefinition
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import fail
 
 EVENTS = "_service_event"
 # The values of `event_type` for a request and a response, by end (service_msgs/ServiceEventInfo); a server's are those
@@ -90,20 +89,16 @@ class Events:
 
 
 def events_in(bag: Bag, stream: Stream, type_: EventType) -> Events | None:
-    """Return the events of a stream to use, or None if no event contains its request.
-
-    Events after damaged data are ignored; the replay reports the damage.
-    """
+    """Return the events of a stream to use, or None if no event contains its request."""
     told: Counter[int] = Counter()
     invalid = 0
-    with suppress(InputError):
-        for recorded in bag.messages([stream.topic]):
-            if recorded.stream != stream:
-                continue
-            if (event := _decoded(recorded, type_)) is None:
-                invalid += 1
-            elif event["request"]:
-                told[event["info"]["event_type"]] += 1
+    for recorded in bag.messages([stream.topic]):
+        if recorded.stream != stream:
+            continue
+        if (event := _decoded(recorded, type_)) is None:
+            invalid += 1
+        elif event["request"]:
+            told[event["info"]["event_type"]] += 1
     return next((Events(type_, *end, told[end[0]], invalid) for end in _ENDS if told[end[0]]), None)
 
 

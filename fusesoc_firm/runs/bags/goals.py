@@ -6,7 +6,6 @@ The calls of ROS 2 become messages of the action's converters.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -81,13 +80,12 @@ class BagOfGoals(BagOfCalls):
         return self._items(topics, self.goals, stop)
 
     def results(self, action: Action, stop: int | None = None) -> Iterator[Told]:
-        """Yield the results of an action up to a stamp in ns, or up to damaged data, which the replay reports."""
+        """Yield the results of an action up to a stamp in ns."""
         blocks = (action.goal, action.result)
         sources = {stream: source for stream, source in self.goals.items() if source.block in blocks}
-        with suppress(InputError):
-            for item in self._items((), sources, stop):
-                if isinstance(item, Told) and item.block == action.result:
-                    yield item
+        for item in self._items((), sources, stop):
+            if isinstance(item, Told) and item.block == action.result:
+                yield item
 
     def blocks_of(self, action: Action) -> set[str]:
         """Return the blocks of an action whose messages the bag contains."""

@@ -65,6 +65,7 @@ class _Routing:
             if item.block not in named and (topic := self._only_topic(item, takers)):
                 takers[topic] = (item,)
         self._check_versions(takers)
+        self._check_foreign(takers)
         self.faults.raise_if_any()
         return {
             stream: Route(takers[stream.topic], self._misfit(stream, takers[stream.topic]))
@@ -112,6 +113,13 @@ class _Routing:
             if wrong and not any(item.frame.ros == ros for item in fitting):
                 versions = f"uses {ros.title}, but '{wrong[0].block}' uses {wrong[0].frame.ros.title}"
                 self.faults.error(f"topic {stream.topic} in {self.bag.path} {versions}")
+
+    def _check_foreign(self, takers: Mapping[str, Sequence[Topic]]) -> None:
+        """Add a fault for each foreign channel whose topic only a subscriber has."""
+        for item in self.bag.foreign:
+            for subscriber in self._named(item.topic) if item.topic not in takers else ():
+                message = f"topic {item.topic} in {self.bag.path} cannot go to '{subscriber.block}': {item.reason}"
+                self.faults.error(message, hint="record it with ROS, or give the block another topic")
 
     def _misfit(self, stream: Stream, subscribers: Sequence[Topic]) -> str:
         """Return the reason why subscribers cannot accept a stream with their topic's name, or an empty string."""

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.node.transport.simulator import Simulator
-from fusesoc_firm.runs.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.runs.replay.command import replay
+from fusesoc_firm.runs.replay.options import Settings, Source, Target
 from fusesoc_firm.runs.simulation.software_run import system_stimuli
 from fusesoc_firm.text.diagnostics import InputError
 from tests.ros.action_simulator import HELD, HERE, Goal

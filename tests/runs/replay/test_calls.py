@@ -23,7 +23,8 @@ from fusesoc_firm.message.bag_reader import open_bag
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.runs.bags import calls
 from fusesoc_firm.runs.bags.events import Events
-from fusesoc_firm.runs.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.runs.replay.command import replay
+from fusesoc_firm.runs.replay.options import Settings, Source, Target
 from fusesoc_firm.runs.simulation.software_run import system_stimuli
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError
@@ -391,23 +392,6 @@ def test_the_exchanges_are_read_beside_the_messages(tmp_path: Path, store: Types
     recorder.written_with_names(tmp_path / "in", texts, 2 * 10**6)
     source = rewritten(tmp_path / "in" / "in.mcap", tmp_path / "plain.mcap", use_chunking=False)
     assert recorder.told(replay_calls(tmp_path, source, name="asking")) == [text[::-1] for text in texts]
-
-
-def test_a_damage_after_the_end_does_not_matter(
-    tmp_path: Path, store: Typestore, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """While a response is looked for, the reading of exchanges comes to the damage."""
-    recorder = Asked(store)
-    for call in range(20):
-        recorder.add(SENT, call, "one", CLIENT)
-    recorder.written_with_names(tmp_path / "in", ["one", "two", "three"], 10**7)
-    source = rewritten(tmp_path / "in" / "in.mcap", tmp_path / "damaged.mcap", chunk_size=500)
-    content = bytearray(source.read_bytes())
-    content[content.rindex(b"three")] ^= 1
-    source.write_bytes(content)
-    replay_calls(tmp_path, Source(source, limit=2), name="asking")
-    (row,) = json.loads(capsys.readouterr().out)["requests"]
-    assert [row[kind] for kind in ("as_recorded", "different", "missing", "not_recorded")] == [1, 1, 8, 0]
 
 
 def test_calls_are_stimuli_of_a_simulation(tmp_path: Path, store: Typestore) -> None:

@@ -16,8 +16,9 @@ from fusesoc_firm.message.bag_reader import Recorded, Stream
 from fusesoc_firm.node.engine.watch import Control
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.runs.bags.goals import Told as Recording
-from fusesoc_firm.runs.replay.command import Settings, Source, Target, replay
+from fusesoc_firm.runs.replay.command import replay
 from fusesoc_firm.runs.replay.hardware_run import Cause, Sent
+from fusesoc_firm.runs.replay.options import Settings, Source, Target
 from fusesoc_firm.runs.replay.sent_goals import SentGoals
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import InputError

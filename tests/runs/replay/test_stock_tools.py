@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.message.bag_reader import Form
-from fusesoc_firm.runs.replay.command import Target
+from fusesoc_firm.runs.replay.options import Target
 from tests.runs.replay.replays import Item, load, passing, payload, read, run, specification, write
 
 PYTHON = "/usr/bin/python3"
