@@ -4,12 +4,23 @@ The codec uses the same Frame as the hardware generator, and serves stimuli and 
 converters; independent serialisers verify them.
 """
 
+from fusesoc_firm.frame.content import trimmed
 from fusesoc_firm.frame.decoder import decode, field_at, field_ranges, used_bytes
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.frame.values import CodecError, MessageValue
 
-__all__ = ["CodecError", "MessageValue", "decode", "encode", "field_at", "field_ranges", "pack_frame", "used_bytes"]
+__all__ = [
+    "CodecError",
+    "MessageValue",
+    "decode",
+    "encode",
+    "field_at",
+    "field_ranges",
+    "pack_frame",
+    "trimmed",
+    "used_bytes",
+]
 
 
 def pack_frame(identifier: int, payload: bytes, id_bytes: int = ID_BYTES) -> bytes:

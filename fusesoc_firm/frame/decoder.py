@@ -12,6 +12,8 @@ from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_
 def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
     """Decode a payload. Numbers become Python numbers, arrays become lists, and `uint8` sequences become bytes.
 
+    Bytes after a message of ROS 2 are ignored, as every reader of ROS 2 does.
+
     Raises:
         CodecError: the payload is too short or too long, has another encoding, or contains invalid values.
     """
@@ -48,16 +50,23 @@ def field_ranges(frame: Frame, payload: bytes) -> Iterator[tuple[int, int, str]]
 
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int, tuple[str, ...]]]]:
     """Return the message, and the (first, end, names) ranges of the payload bytes that carry the message."""
-    if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
-        raise CodecError(f"the payload of {frame.message} must have {frame.payload_bytes} bytes, not {len(payload)}")
+    if frame.is_fixed_size and not _may_have(len(payload), frame.payload_bytes, frame):
+        least = "at least " if frame.trailing_bytes else ""
+        size = f"{least}{frame.payload_bytes} bytes, not {len(payload)}"
+        raise CodecError(f"the payload of {frame.message} must have {size}")
     checked = payload[: frame.checked_prefix]
     if checked != frame.prefix[: frame.checked_prefix]:
         raise CodecError(f"the payload of {frame.message} has the unknown encoding {checked.hex()}")
     reader = _Reader(frame, payload)
     message = reader.read(frame.nodes, 0)
-    if len(payload) - reader.position > frame.trailing_bytes:
+    if not _may_have(len(payload), reader.position, frame):
         raise CodecError(f"{frame.message} ends after {reader.position} bytes, but the payload has {len(payload)}")
     return message, reader.used
+
+
+def _may_have(size: int, content: int, frame: Frame) -> bool:
+    """Return whether a payload of `size` bytes may have a message of `content` bytes."""
+    return size >= content if frame.trailing_bytes else size == content
 
 
 class _Reader:

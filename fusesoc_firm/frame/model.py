@@ -173,8 +173,8 @@ NameTree = dict[str, "NameTree"]
 class Frame:
     """The layout of a message.
 
-    `prefix` is the constant bytes before the first field; a receiver checks only the first `checked_prefix` bytes. A
-    sender may append up to `trailing_bytes` bytes after the last field.
+    `prefix` is the constant bytes before the first field; a receiver checks only the first `checked_prefix` bytes. The
+    hardware accepts up to `trailing_bytes` bytes after the last field; unless this is 0, the host accepts any number.
     """
 
     message: MessageName

@@ -62,17 +62,17 @@ def test_a_missing_field_is_named(frame: Frame) -> None:
         encode(frame, {name: value for name, value in GOOD.items() if name != "u"})
 
 
-@pytest.mark.parametrize("extra", [-21, -1, 4])
-def test_other_lengths_are_refused(frame: Frame, extra: int) -> None:
-    payload = (encode(frame, GOOD) + bytes(4))[: frame.payload_bytes + extra]
-    with pytest.raises(CodecError, match=rf"^the payload of p/M must have 21 bytes, not {21 + extra}$"):
+@pytest.mark.parametrize("missing", [21, 1])
+def test_short_payloads_are_refused(frame: Frame, missing: int) -> None:
+    payload = encode(frame, GOOD)[: 21 - missing]
+    with pytest.raises(CodecError, match=rf"^the payload of p/M must have at least 21 bytes, not {21 - missing}$"):
         decode(frame, payload)
 
 
-@pytest.mark.parametrize("extra", [1, 2, 3])
+@pytest.mark.parametrize("extra", [1, 2, 3, 4, 200])
 def test_trailing_bytes_are_ros2s(frame: Frame, extra: int) -> None:
     assert decode(frame, encode(frame, GOOD) + b"\xee" * extra) == GOOD
-    with pytest.raises(CodecError):
+    with pytest.raises(CodecError, match=rf"^the payload of .* must have 1 bytes, not {1 + extra}$"):
         decode(layout(ROS1, "uint8 u\n"), bytes(1 + extra))
 
 
