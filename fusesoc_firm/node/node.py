@@ -22,6 +22,7 @@ from functools import partial
 from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.frame.faults import told
 from fusesoc_firm.node.actions.actions import NodeActions
 from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.engine.calls import NodeCalls
@@ -65,8 +66,11 @@ class HardwareListener(Protocol):
     def taken(self, first_cycle: int, last_cycle: int) -> None:
         """Handle the transfer of the next sent frame to simulated hardware in these cycles of clk."""
 
-    def refused(self, converter: int | None) -> None:
-        """Handle a fault from the hardware: of a converter, numbered as in `frame_error`, or in a frame's id (None)."""
+    def refused(self, converter: int | None, code: int = 0) -> None:
+        """Handle a fault from the hardware: of a converter, numbered as in `frame_error`, or in a frame's id (None).
+
+        `code` is that of the converter's fault, or 0 if the transport does not tell it.
+        """
 
     def wants_waits(self) -> bool:
         """Return whether simulated hardware should count the cycles in which its wires wait."""
@@ -579,12 +583,12 @@ class Node:
         if self._trace:
             self._trace.taken(first_cycle, last_cycle)
 
-    def refused(self, converter: int | None) -> None:
-        """Report a converter's fault; any thread may call this method."""
+    def refused(self, converter: int | None, code: int = 0) -> None:
+        """Report a converter's fault and its code, or 0 if that is unknown; any thread may call this method."""
         if converter is not None and converter in self._subscriber_names:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
-            self._report(f"the hardware rejected a malformed message from '{block}'")
+            self._report(f"the hardware rejected a message from '{block}': {told(code)}")
             self._refuse(block, "the hardware rejected the request")
             if self._trace:
                 self._trace.refused(converter)

@@ -105,9 +105,9 @@ class _LateListener:
         if self.listens:
             self._listener.taken(first_cycle, last_cycle)
 
-    def refused(self, converter: int | None) -> None:
+    def refused(self, converter: int | None, code: int = 0) -> None:
         if self.listens:
-            self._listener.refused(converter)
+            self._listener.refused(converter, code)
 
     def wants_waits(self) -> bool:
         return self.listens and self._listener.wants_waits()
@@ -120,6 +120,6 @@ def _tell(listener: HardwareListener, event: Event) -> None:
     if isinstance(event, Taken):
         listener.taken(event.first_cycle, event.last_cycle)
     elif isinstance(event, ErrorPulse):
-        listener.refused(event.converter)
+        listener.refused(event.converter, event.code)
     elif isinstance(event, Waits):
         listener.waited(event.first, event.cycle, event.counts)

@@ -21,7 +21,7 @@ from tests.seeds import seeded
 
 SEED = seeded(20240611)
 EVERY_BYTE = bytes(range(256))
-VERSION = b"V\4"
+VERSION = b"V\5"
 FRAME = b"\x07\x04\x00\x00\x00\x00\x0a\xff\x0d"
 
 
@@ -204,7 +204,7 @@ def test_pulses_of_errors(bench: PipeBench) -> None:
         assert simulator.run(100)[:1] == [ErrorPulse(None, 3)]
     with bench.start(FAULT="frame_pulse") as simulator:
         simulator.request(FRAME)
-        assert simulator.run(100)[:1] == [ErrorPulse(0, 3)]
+        assert simulator.run(100)[:1] == [ErrorPulse(0, 3, 7)]
         assert simulator.cycle == 4
 
 

@@ -108,7 +108,7 @@ class Simulator:
             "unsent": (b"T" + bytes(16)) * 100,
             "backwards": b"S" + bytes(12),
             "long": b"B" + bytes(19) + b"\xff" * 4,
-            "error": b"E\1\0" + self.cycle.to_bytes(8, "little") + b"I" + self.cycle.to_bytes(8, "little"),
+            "error": b"E\1\0\7" + self.cycle.to_bytes(8, "little") + b"I" + self.cycle.to_bytes(8, "little"),
         }.get(self.fault, b"")
 
     def waits(self) -> bytes:
@@ -164,7 +164,7 @@ def main() -> None:
     options = arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at
     simulator = Simulator(*options, words, arguments.waits)
     with open(3, "rb") as requests, open(4, "wb") as reports:
-        reports.write(b"V\4")
+        reports.write(b"V\5")
         while (letter := requests.read(1)) not in (b"", b"Q"):
             if letter == b"W":
                 reports.write(simulator.waits())

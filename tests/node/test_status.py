@@ -109,7 +109,7 @@ class Listener:
     def taken(self, first_cycle: int, last_cycle: int) -> None:
         raise AssertionError
 
-    def refused(self, converter: int | None) -> None:
+    def refused(self, converter: int | None, code: int = 0) -> None:
         raise AssertionError
 
     def wants_waits(self) -> bool:

@@ -10,7 +10,7 @@ def number(value: int, size: int) -> bytes:
 def main() -> None:
     cycle = 0
     with open(3, "rb") as requests, open(4, "wb") as reports:
-        reports.write(b"V" + number(4, 1))
+        reports.write(b"V" + number(5, 1))
         while (letter := requests.read(1)) not in (b"", b"Q"):
             size = int.from_bytes(requests.read(4), "little")
             if letter == b"R":

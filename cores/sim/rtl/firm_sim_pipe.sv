@@ -41,6 +41,8 @@ module firm_sim_pipe #(
 
   input  wire               id_error,
   input  wire [ERRORS-1:0]  frame_error,
+  // The code of each converter's fault, read with a pulse in frame_error.
+  input  wire [4*ERRORS-1:0] frame_code,
   // High in each cycle in which a wire has a message or a beat that is not taken.
   input  wire [WIRES-1:0]   waits
 );
@@ -52,7 +54,7 @@ module firm_sim_pipe #(
   localparam MOST_ERRORS  = 65534;
   localparam MOST_WIRES   = 65533;
   localparam MOST_WAITED  = 2147483647;
-  localparam VERSION      = 4;           // of requests and reports
+  localparam VERSION      = 5;           // of requests and reports
   localparam MOST_QUIET   = 2147483647;
   // Bytes that are read at once, and written at once: a call for each byte takes more time than the simulation.
   localparam PIECE_BYTES  = 4096;
@@ -98,6 +100,7 @@ module firm_sim_pipe #(
   reg [7:0]         tid;
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
+  reg [4*ERRORS-1:0] frame_codes;
   reg [WIRES-1:0]   wait_levels;         // only while waits are counted
 
   // A beat that waited for `tready`, so that the stream from the system must hold it.
@@ -262,6 +265,7 @@ module firm_sim_pipe #(
       is_reported = 1;
       $fwrite(reports, "E");
       write_number({32'b0, converter}, 2);
+      write_number({60'b0, frame_codes[4*converter+:4]}, 1);
       write_number(cycle, 8);
     end
   endtask
@@ -524,6 +528,7 @@ module firm_sim_pipe #(
       tlast        = s_axis_tlast;
       id_pulse     = id_error;
       frame_pulses = frame_error;
+      frame_codes  = frame_code;
       if (is_counting)
         wait_levels = waits;
     end

@@ -8,6 +8,7 @@
 -- its outputs change HOLD after it.
 library ieee;
 use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
@@ -51,6 +52,8 @@ entity firm_sim_pipe is
 
     id_error    : in std_logic                           := '0';
     frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0');
+    -- The code of each converter's fault, read with a pulse in frame_error.
+    frame_code  : in std_logic_vector(4*ERRORS-1 downto 0) := (others => '0');
     -- High in each cycle in which a wire has a valid message or beat that is not accepted.
     waits       : in std_logic_vector(WIRES-1 downto 0)  := (others => '0')
   );
@@ -68,7 +71,7 @@ architecture simulation of firm_sim_pipe is
   constant NO_WAITS     : std_logic_vector(WIRES-1 downto 0) := (others => '0');
   constant MOST_WIRES   : natural  := 2**16 - 3;
   -- Of requests and reports.
-  constant VERSION      : natural  := 4;
+  constant VERSION      : natural  := 5;
 
   type level_t is array (boolean) of std_logic;
   constant LEVEL_OF : level_t := (false => '0', true => '1');
@@ -319,7 +322,7 @@ begin
     begin
       is_reported := true;
       write(reports, 'E');
-      write_number(converter, 2);
+      write_number(converter + 2**16*to_integer(unsigned(frame_code(4*converter+3 downto 4*converter))), 3);
       write_cycle(cycle);
     end procedure report_error;
 

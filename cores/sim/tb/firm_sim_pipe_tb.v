@@ -40,6 +40,7 @@ module firm_sim_pipe_tb;
     .s_axis_tready(in_tready),
     .id_error(id_error),
     .frame_error(frame_error),
+    .frame_code(4'd7),
     .waits(waits)
   );
 

@@ -69,6 +69,7 @@ begin
       s_axis_tready => in_tready,
       id_error      => id_error,
       frame_error   => frame_error,
+      frame_code    => "0111",
       waits         => waits
     );
 

@@ -35,7 +35,7 @@ from fusesoc_firm.tools import piped
 MOST_CYCLES = 2**31 - 1
 """The maximum number of cycles in one run, and of bytes in a frame."""
 
-PIPE_VERSION = 4
+PIPE_VERSION = 5
 """The version of requests and reports."""
 WAITS_SECONDS = 0.01
 """The minimum time between two requests of waits, and until the end of their count."""
@@ -64,10 +64,11 @@ class Taken:
 
 @dataclass(frozen=True)
 class ErrorPulse:
-    """A pulse of a converter's bit in `frame_error`, or of `id_error` if the converter is None."""
+    """A pulse of a converter's bit in `frame_error` with its fault's code, or of `id_error` without a converter."""
 
     converter: int | None
     cycle: int
+    code: int = 0
 
 
 @dataclass(frozen=True)
@@ -269,7 +270,8 @@ class Simulator(Closing):
             tid, end, first, last = self._number(2), self._number(1), self._number(8), self._number(8)
             return Burst(self._read(self._number(4)), tid, first, last, is_aborted=bool(end))
         if kind == b"E":
-            return ErrorPulse(self._number(2), self._number(8))
+            converter, code = self._number(2), self._number(1)
+            return ErrorPulse(converter, self._number(8), code)
         if kind == b"I":
             return ErrorPulse(None, self._number(8))
         if kind == b"W":

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.codec import CodecError, decode, trimmed
 from fusesoc_firm.message.bag_reader import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
@@ -198,4 +198,4 @@ def read_bag(
                     message = decode(subscriber.frame, recorded.payload)
                 except CodecError as error:
                     fail(f"{path}, topic {recorded.stream.topic}: {error}")
-                yield subscriber, recorded.payload, message
+                yield subscriber, trimmed(subscriber.frame, recorded.payload), message

@@ -14,8 +14,9 @@ from functools import cached_property
 
 from fusesoc_firm.accelerator.functions import Functions, Message
 from fusesoc_firm.accelerator.software import sent_elsewhere
-from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
+from fusesoc_firm.frame.codec import CodecError, decode, pack_frame, trimmed
 from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.faults import told
 from fusesoc_firm.node.engine.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.engine.watch import Watch
 from fusesoc_firm.node.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
@@ -123,6 +124,7 @@ class SystemRun:
 
         If the message is rejected, add a fault. May raise `StuckError` and `TransportError`.
         """
+        payload = trimmed(topic.frame, payload)
         try:
             message = decode(topic.frame, payload)
         except CodecError as error:
@@ -186,8 +188,8 @@ class SystemRun:
                             cause.first_cycle = cycle
                     case Burst():
                         self._receive(event, cause)
-                    case ErrorPulse(converter=converter):
-                        self.faults.append(self._error(converter))
+                    case ErrorPulse(converter=converter, code=code):
+                        self.faults.append(self._error(converter, code))
             if self._waiting and self.simulator.cycle >= self._deadline:
                 raise StuckError(f"the system does not accept the message at '{self._waiting[0].block}'")
 
@@ -224,10 +226,10 @@ class SystemRun:
     def _send(self, topic: Topic, payload: bytes, cause: Cause, beats: tuple[int, int] | None) -> None:
         self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), beats))
 
-    def _error(self, converter: int | None) -> str:
+    def _error(self, converter: int | None, code: int) -> str:
         if converter is None:
             return "the hardware reports id_error: no subscriber has the frame's id"
-        return f"the hardware reports frame_error at '{self.system.error_blocks[converter]}'"
+        return f"the hardware reports frame_error at '{self.system.error_blocks[converter]}': {told(code)}"
 
 
 def published(system: DerivedSystem) -> list[Topic]:

@@ -77,7 +77,7 @@ class Model:
     def answer(self, kind: str, subscriber: int, payload: bytes, last: int) -> None:
         frames = [le(subscriber + number, 1) + le(len(payload), 4) + payload for number in range(2)]
         if kind == "broken" and payload[:1] == b"\xee":
-            self.report(last, b"E" + le(subscriber, 2) + le(last, 8))
+            self.report(last, b"E" + le(subscriber, 2) + le(7, 1) + le(last, 8))
         elif kind in ("echo", "twice", "broken", "grumpy"):
             end = self.send(subscriber, frames[0], last + 20)
             if kind == "twice":
@@ -117,7 +117,7 @@ class Model:
 
 def main(requests: BinaryIO, reports: BinaryIO) -> None:
     model = Model(int(sys.argv[1]), sys.argv[2:])
-    reports.write(b"V\4")
+    reports.write(b"V\5")
     while letter := requests.read(1):
         if letter == b"F":
             model.frames.append(requests.read(int.from_bytes(requests.read(4), "little")))

@@ -11,7 +11,7 @@ import yaml
 
 from fusesoc_firm.runs.replay.options import Source
 from fusesoc_firm.text.diagnostics import InputError
-from tests.runs.replay.replays import load, passing, run, specification
+from tests.runs.replay.replays import load, passing, read, run, specification
 from tests.storage.forms import items, with_mcap, with_sqlite
 
 Captured = pytest.CaptureFixture[str]
@@ -91,3 +91,13 @@ def test_files_that_the_metadata_do_not_list(tmp_path: Path, spec: Path) -> None
     bag = with_sqlite(tmp_path, items(2, 9), files=2, metadata={"relative_file_paths": ["a_1.db3"]})
     with pytest.raises(InputError, match=r"contains a_0\.db3, which metadata\.yaml does not list\n.*reindex"):
         run(load(spec), bag, tmp_path / "out.mcap", "echo")
+
+
+def test_bytes_after_the_messages_are_ignored(tmp_path: Path, spec: Path, capsys: Captured) -> None:
+    """rclpy's `serialize_message` returns its whole buffer."""
+    found = items(2, 6)
+    longer = [item._replace(payload=item.payload + bytes(range(4 + 16 * number))) for number, item in enumerate(found)]
+    run(load(spec), with_sqlite(tmp_path, longer, metadata={}), tmp_path / "out.mcap", "echo")
+    assert "4 in, 4 out, 2 dropped, 0 errors" in capsys.readouterr().out
+    answers = [(stamp, payload) for _, _, stamp, payload in read(tmp_path / "out.mcap")]
+    assert answers == [(item.stamp, item.payload) for item in found if item.topic == "/p"]

@@ -18,6 +18,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -29,6 +30,7 @@
 #include <vector>
 
 #include <firm/bursts.hpp>
+#include <firm/faults.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/queues.hpp>
 #include <firm/status_exchange.hpp>
@@ -396,7 +398,8 @@ class Node {
     ++errors_;
     const std::string where = error.cycle ? " in cycle " + std::to_string(*error.cycle) : "";
     const std::string who = error.converter ? "converter " + std::to_string(*error.converter) : "the link or the Manager";
-    log(who + " reports an error" + where);
+    const bool is_known = error.code > 0 && error.code < std::size(kFaultTexts);
+    log(who + " reports an error" + where + (is_known ? std::string(": ") + kFaultTexts[error.code] : ""));
     const bool is_subscriber = error.converter && *error.converter < configuration_.subscribers;
     if (is_subscriber && configuration_.on_rejected) configuration_.on_rejected(*error.converter);
   }

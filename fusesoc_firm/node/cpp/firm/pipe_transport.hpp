@@ -95,7 +95,7 @@ class PipeTransport : public Transport {
   static constexpr int kRequests = 3;
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
-  static constexpr unsigned kVersion = 4;  // of requests and reports
+  static constexpr unsigned kVersion = 5;  // of requests and reports
   // The interval at which a simulator at rest is checked, since it may have ended.
   static constexpr std::chrono::nanoseconds kLook = std::chrono::milliseconds(250);
 
@@ -251,6 +251,7 @@ class PipeTransport : public Transport {
   void take_error() {
     HardwareError error;
     error.converter = static_cast<unsigned>(number(2));
+    error.code = static_cast<unsigned>(number(1));
     error.cycle = number(8);
     if (options_.on_error) options_.on_error(error);
   }

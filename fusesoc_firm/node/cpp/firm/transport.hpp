@@ -52,6 +52,7 @@ struct HardwareError {
   // The converter whose frame_error pulsed; nothing for id_error, and for bytes that a link lost.
   std::optional<unsigned> converter = std::nullopt;
   std::optional<std::uint64_t> cycle = std::nullopt;
+  unsigned code = 0;  // of the converter's fault (faults.hpp), or 0 if the transport does not tell it
 };
 
 // A transport's parameters from the system, and callbacks for events other than bursts. The transport's threads call
