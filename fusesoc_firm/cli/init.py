@@ -132,7 +132,7 @@ def _copy_example(arguments: argparse.Namespace) -> None:
 
 def _start(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.library import libraries
-    from fusesoc_firm.system.scaffold.project import LANGUAGES, create
+    from fusesoc_firm.system.scaffold.project import LANGUAGES, create, usual_size_of
     from fusesoc_firm.tools.library_path import library_root
 
     recording = _recording(arguments)
@@ -145,6 +145,9 @@ def _start(arguments: argparse.Namespace) -> None:
     _print_files(folder, create(project, folder, known, library_root(), arguments.path))
     source = LANGUAGES[project.language].source.format(project.name)
     print(f"ROS {project.ros}: {project.input} in, {project.output} out")
+    if usual := usual_size_of(project, known):
+        spec = folder / f"{project.name}.yaml"
+        print(f"maxLength: messages of up to {usual.bytes} bytes ({usual.example}); change it in {spec}")
     print(f"edit: {folder / source} (the computation), {folder / 'model.py'} (the responses that it must give)")
     print(f"next: cd {folder} && firm sim")
 
@@ -177,12 +180,13 @@ def _project(arguments: argparse.Namespace, known: Libraries, recording: Recordi
     }
     answers = {name: value for name, value in given.items() if value is not None}
     if recording:
+        answers |= {name: recording.named(answers[name]) for name in ("in", "out") if name in answers}
         answers["ros"] = str(recording.ros.number)
         if not {"in", "out"} <= answers.keys():
             print(*recording.table, sep="\n")
     topics = {topic: str(message) for topic, (message, _) in recording.topics.items()} if recording else {}
-    if arguments.include and arguments.input:
-        answers.setdefault("out", topics.get(arguments.input, arguments.input))
+    if arguments.include and "in" in answers:
+        answers.setdefault("out", topics.get(answers["in"], answers["in"]))
     if {"name", "in", "out"} <= answers.keys():
         answers = {"ros": "2", "language": "vhdl", "width": "8"} | answers
 

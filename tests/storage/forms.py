@@ -81,20 +81,26 @@ def _fill(writer: Any, found: Sequence[Item], store: Stores) -> None:
 
 
 def with_mcap(
-    folder: Path, found: Sequence[Item], ros: int = 2, foreign: Sequence[str] = (), more: str = "", **options: Any
+    folder: Path,
+    found: Sequence[Item],
+    ros: int = 2,
+    foreign: Sequence[str] = (),
+    profile: str = "",
+    topics: Sequence[str] = TOPICS,
+    **options: Any,
 ) -> Path:
     """Write a file with options of mcap's writer; `foreign` are encodings of more channels, with a message each."""
     path = folder / "a.mcap"
     with path.open("wb") as file:
         writer = McapWriter(file, **{"chunk_size": 500, "use_statistics": True, **options})
-        writer.start(profile=more)
+        writer.start(profile=profile)
         name, language, encoding = ("geometry_msgs/Point", "ros1msg", "ros1") if ros == 1 else (POINT, "ros2msg", "cdr")
         schema = writer.register_schema(name, language, TEXT.encode())
-        channels = {topic: writer.register_channel(topic, encoding, schema) for topic in TOPICS}
+        channels = {topic: writer.register_channel(topic, encoding, schema) for topic in topics}
         for number, other in enumerate(foreign):
             kind = writer.register_schema(f"other.Type{number}", f"{other}schema", b"\xff\0{")
             channel = writer.register_channel(f"/other{number}", other, kind)
-            writer.add_message(channel, found[0].stamp, b"{}", found[0].stamp)
+            writer.add_message(channel, 10**18, b"{}", 10**18)
         for item in found:
             writer.add_message(channels[item.topic], item.stamp, item.payload, item.stamp)
         writer.finish()  # type: ignore[no-untyped-call]
@@ -332,7 +338,7 @@ def _mcap() -> Iterable[tuple[str, Form]]:
     yield "mcap-no-summary", partial(with_mcap, **bare)
     yield "mcap-no-summary-no-chunks", partial(with_mcap, use_chunking=False, **bare)
     yield "mcap-no-schemas-in-summary", partial(with_mcap, repeat_schemas=False)
-    yield "mcap-profile", partial(with_mcap, more="ros2")
+    yield "mcap-profile", partial(with_mcap, profile="ros2")
     yield "mcap-foreign", partial(with_mcap, foreign=("json", "protobuf", "flatbuffer", ""))
 
 

@@ -6,13 +6,13 @@ the project does not depend on the recording.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.codec import CodecError, decode, trimmed
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, open_bag
+from fusesoc_firm.message.bag_reader import Bag, Foreign, Form, Recorded, open_bag
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Definitions, Middleware
 from fusesoc_firm.message.model import MessageName
@@ -36,13 +36,14 @@ class Recording:
     """A bag from which a project can be started: the ROS version, the topics and whether it has definitions.
 
     `topics` are sorted, each with its message and the number of recorded messages. Topics whose types a specification
-    cannot name are omitted.
+    cannot name are omitted. `foreign` are the channels that are not of ROS.
     """
 
     path: Path
     ros: Middleware
     topics: Mapping[str, tuple[MessageName, int]]
     has_definitions: bool
+    foreign: Sequence[Foreign] = ()
 
     @classmethod
     def of(cls, path: Path) -> Recording:
@@ -50,8 +51,11 @@ class Recording:
         with open_bag(path) as bag:
             topics = _topics_of(bag)
             if not topics:
-                fail(f"{path} contains no topics")
-            return cls(path, bag.form.ros, topics, any(stream.definition for stream in bag.streams))
+                others = [str(item) for item in bag.foreign]
+                others += [f"{stream.topic}: '{stream.type}' is not the name of a message" for stream in bag.streams]
+                fail(f"{path} contains no topics of ROS", hint="; ".join(others))
+            has_definitions = any(stream.definition for stream in bag.streams)
+            return cls(path, bag.form.ros, topics, has_definitions, bag.foreign)
 
     @property
     def table(self) -> list[str]:
@@ -59,7 +63,12 @@ class Recording:
         rows = [("topic", "message", "count")]
         rows += [(topic, str(message), str(count)) for topic, (message, count) in self.topics.items()]
         first, second, third = (max(len(row[column]) for row in rows) for column in range(3))
-        return [f"{topic:{first}}  {message:{second}}  {count:>{third}}" for topic, message, count in rows]
+        lines = [f"{topic:{first}}  {message:{second}}  {count:>{third}}" for topic, message, count in rows]
+        return [*lines, *(f"not offered: {item}" for item in self.foreign)]
+
+    def named(self, topic: str) -> str:
+        """Return the topic that a relative name means, or the name unchanged if there is none."""
+        return absolute_name(topic) if absolute_name(topic) in self.topics else topic
 
     def stimuli(self, project: Project, library: MessageLibrary, limit: int | None = None) -> RecordedStimuli:
         """Return the first messages of a project's input topic, with the definitions of both messages.
@@ -73,23 +82,26 @@ class Recording:
         }
         definitions = {topic: library.closure(name) for topic, name in names.items()}
         topics = {topic: RecordedTopic.of(topic, found) for topic, found in definitions.items()}
-        form, found = self._first(project.input_topic, definitions[project.input_topic], limit)
+        form, found, longest = self._first(project.input_topic, definitions[project.input_topic], limit)
 
         def write(path: Path) -> None:
             with write_bag(path, form, list(topics.values())) as written:
                 for item in found:
                     written.write(topics[project.input_topic], item.stamp, item.payload)
 
-        return RecordedStimuli(f"stimuli{_SUFFIXES[form]}", max(len(item.payload) for item in found), write)
+        return RecordedStimuli(f"stimuli{_SUFFIXES[form]}", longest, write)
 
-    def _first(self, topic: str, definitions: Definitions, limit: int | None) -> tuple[Form, list[Recorded]]:
+    def _first(self, topic: str, definitions: Definitions, limit: int | None) -> tuple[Form, list[Recorded], int]:
+        """Return the first messages of a topic, and the bytes of the longest payload of all its messages."""
         message = list(definitions)[-1]
         taker = Topic(topic, frame_of(message, definitions), given_name=topic)
         with open_bag(self.path) as bag:
             routes = routes_of(bag, [taker], {(self.ros, message): signature(message, definitions)})
             if misfit := next((route.misfit for route in routes.values() if route.misfit), ""):
                 fail(f"topic {topic} in {self.path}: {misfit}")
-            found = list(_excerpt(bag.messages({stream.topic for stream in routes}), limit))
+            topics = {stream.topic for stream in routes}
+            found = list(_excerpt(bag.messages(topics), limit))
+            longest = max((len(trimmed(taker.frame, item.payload)) for item in bag.messages(topics)), default=0)
         if not found:
             fail(f"{self.path} contains no message of topic {topic}")
         for item in found:
@@ -97,7 +109,7 @@ class Recording:
                 decode(taker.frame, item.payload)
             except CodecError as error:
                 fail(f"{self.path}: {topic}, message {item.number}: {error}")
-        return bag.form, found
+        return bag.form, found, longest
 
 
 def _topics_of(bag: Bag) -> dict[str, tuple[MessageName, int]]:

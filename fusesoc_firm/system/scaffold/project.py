@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.frame.length import longest_payload, sent_length_of
+from fusesoc_firm.frame.length import bounded_payload, longest_payload, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop
 from fusesoc_firm.frame.model import Path as FieldPath
 from fusesoc_firm.frame.select import select
@@ -27,6 +27,7 @@ from fusesoc_firm.system.scaffold.first_stimuli import first_stimuli
 from fusesoc_firm.system.scaffold.pass_through import equal_paths, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
+from fusesoc_firm.system.scaffold.usual_sizes import Usual, usual_size
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.written.specification import SOFTWARE
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError, fail, nearest
@@ -211,7 +212,8 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     ros, stimuli = middleware_of(project.ros), project.stimuli
     taken, given = (_frame(name, ros, known) for name in (project.input, project.output))
     spec = folder / f"{project.name}.yaml"
-    write(spec, render("project/specification.yaml", _specification(project, ros, taken, given)))
+    context = _specification(project, ros, taken, given) | {"max_length": _max_length(project, taken, known)}
+    write(spec, render("project/specification.yaml", context))
     loaded = load_system(spec, known, needs_sources=False)
     has_arithmetic = project.language in ("vhdl", "verilog")
     for path, text in missing_sources(loaded.system, folder, has_arithmetic=has_arithmetic).items():
@@ -268,10 +270,25 @@ def _specification(project: Project, ros: Middleware, taken: Frame, given: Frame
         "is_topic": not project.input_topic,
         "input_topic": project.input_topic,
         "output_topic": project.output_topic,
-        "max_length": [_power_of_two(longest)] if longest > longest_payload(taken) else [],
         "first": accelerators[0]["name"],
         "buffer": buffer,
     }
+
+
+def usual_size_of(project: Project, known: Libraries) -> Usual | None:
+    """Return the usual size of a new project's input, or None if a bag or the definition tells its length."""
+    ros = middleware_of(project.ros)
+    if project.stimuli or bounded_payload(_frame(project.input, ros, known)) is not None:
+        return None
+    return usual_size(known[ros].closure(parse_name(project.input)))
+
+
+def _max_length(project: Project, taken: Frame, known: Libraries) -> list[Context]:
+    """Return the bytes of the longest payload and the reason, if the default is too small."""
+    if project.stimuli and project.stimuli.longest > longest_payload(taken):
+        return [{"bytes": _power_of_two(project.stimuli.longest), "reason": "the longest payload in the bag"}]
+    usual = usual_size_of(project, known)
+    return [{"bytes": usual.bytes, "reason": usual.example}] if usual else []
 
 
 def _power_of_two(size: int) -> int:

@@ -16,7 +16,8 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.message.bag_reader import definitions_in
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.runs.simulation.excerpt import Recording
-from tests.runs.replay.replays import FORMS, POINT, Item, payload, points, read, store_of, write
+from tests.runs.replay.replays import FORMS, POINT, STRING, Item, payload, points, read, store_of, write
+from tests.storage.forms import with_mcap
 
 Captured = pytest.CaptureFixture[str]
 SUFFIXES = {"ros1": ".bag", "sqlite3": ".db3", "mcap": ".mcap"}
@@ -101,6 +102,41 @@ def test_long_messages_have_a_limit_and_a_buffer(tmp_path: Path, monkeypatch: py
     subscriber, _, publisher = specification(tmp_path / "turn")["blocks"]
     assert (subscriber["maxLength"], publisher.get("buffer")) == (2**17, None)
     assert main(["init", "other", *arguments, "--out", "sensor_msgs/Image"]) == 0
+
+
+def test_the_longest_message_of_the_bag_counts_and_not_only_of_the_first_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts = [payload("mcap", STRING, "x" * (100_000 if number == 15 else 5)) for number in range(20)]
+    write(tmp_path / "drive", "mcap", [("/name", STRING, 10**18 + n, data) for n, data in enumerate(texts)])
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "turn", "--from-bag", "drive", "--in", "name", "--out", "std_msgs/Empty"]) == 0
+    assert len(read(tmp_path / "turn" / "stimuli.mcap")) == 10
+    subscriber = specification(tmp_path / "turn")["blocks"][0]
+    assert (subscriber["topic"], subscriber["maxLength"]) == ("/name", 2**17)
+
+
+@pytest.mark.parametrize(("message", "most"), [("sensor_msgs/Image", 2**22), ("stereo_msgs/DisparityImage", 2**22)])
+def test_without_a_bag_a_large_message_has_its_usual_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], message: str, most: int
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "turn", "--in", message, "--out", "std_msgs/Bool"]) == 0
+    assert specification(tmp_path / "turn")["blocks"][0]["maxLength"] == most
+    said = f"maxLength: messages of up to {most} bytes (an image of 1280 x 720 pixels of 4 bytes); change it in"
+    assert said in capsys.readouterr().out
+
+
+def test_without_a_bag_a_small_message_has_no_limit_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "turn", "--in", "std_msgs/String", "--out", "std_msgs/Bool"]) == 0
+    assert "maxLength" not in specification(tmp_path / "turn")["blocks"][0]
+
+
+def test_a_bag_of_foreign_channels_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = with_mcap(tmp_path, [], foreign=("json",), topics=())
+    assert main(["init", "turn", "--from-bag", str(bag)]) == 1
+    assert "contains no topics of ROS\n      = /other0: its messages are in 'json'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
