@@ -276,11 +276,11 @@ class DmaTransport : public Transport {
   }
 
   void check(std::size_t channel, const char* name) {
-    struct Fault {
+    struct EngineFault {
       std::uint32_t bit;
       const char* text;
     };
-    static constexpr Fault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (response from memory)"},
+    static constexpr EngineFault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (response from memory)"},
                                         {1U << 6, "DMADecErr (address)"},       {1U << 8, "SGIntErr (descriptor)"},
                                         {1U << 9, "SGSlvErr (response from memory)"}, {1U << 10, "SGDecErr (address)"}};
     const std::uint32_t status = device_->read(channel + dma::kStatus);
