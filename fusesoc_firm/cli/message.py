@@ -9,6 +9,7 @@ from typing import Any
 
 from fusesoc_firm.cli.common import add_definitions, command, library_of, positive
 from fusesoc_firm.converter.stages import STAGES, stages_text
+from fusesoc_firm.text.diagnostics import fail
 
 
 def add_message(commands: Any) -> None:
@@ -71,6 +72,11 @@ def _add_verification(verify: argparse.ArgumentParser) -> None:
         "--cluster", metavar="ADDRESS", help="run on the Dask cluster of the scheduler at ADDRESS, not on this machine"
     )
     verify.add_argument("--report", type=Path, metavar="F.json", help="write the report to F.json and F.html")
+    verify.add_argument(
+        "--resume",
+        action="store_true",
+        help="keep the messages that passed in the report at --report, unless their definitions changed",
+    )
     verify.add_argument("--json", action="store_true", help="print the report as JSON instead of a summary")
     verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each failed message in DIR")
 
@@ -94,6 +100,8 @@ def _verify_messages(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.runs.verify.campaign import Settings
     from fusesoc_firm.runs.verify.command import Places, verify_messages
 
+    if arguments.resume and not arguments.report:
+        fail("--resume needs --report")
     command = ["firm", "message", "verify", "--ros", str(arguments.ros)]
     command += [word for path in arguments.path for word in ("--path", str(path))]
     command += ["--distro", arguments.distro] if arguments.distro else []
@@ -102,5 +110,13 @@ def _verify_messages(arguments: argparse.Namespace) -> None:
         library_of(arguments, arguments.ros),
         arguments.types,
         Settings(arguments.width, arguments.stimuli, arguments.seed, keeps_files=arguments.keep is not None),
-        Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command, arguments.json),
+        Places(
+            arguments.jobs,
+            arguments.cluster,
+            arguments.report,
+            arguments.keep,
+            command,
+            arguments.json,
+            arguments.resume,
+        ),
     )

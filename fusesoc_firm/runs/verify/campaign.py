@@ -12,9 +12,10 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_full_name
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.runs.verify.complexity import Statistics, statistics
 from fusesoc_firm.runs.verify.task import Result, Task, Verdict, verify
-from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.tools.workers import Workers
 
 
@@ -33,7 +34,7 @@ class Entry:
     """A message and its result.
 
     `same_as` is the verified message with the same layout, if this message itself was not verified; `statistics` is
-    None for an illegal definition.
+    None and `signature` is empty for an illegal definition.
     """
 
     name: MessageName
@@ -41,21 +42,26 @@ class Entry:
     result: Result
     statistics: Statistics | None = None
     same_as: MessageName | None = None
+    signature: str = ""
 
 
-def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName]:
+def select(library: MessageLibrary, patterns: Sequence[str], faults: Diagnostics) -> list[MessageName]:
     """Return the sorted messages that names or patterns (with `*` and `?`) select; without patterns, all messages.
 
-    The name of a service or an action selects all its messages. Raise `InputError` for a name or pattern without a
-    match, and for all faults in the definitions of a named message.
+    The name of a service or an action selects all its messages. A name or pattern without a match is a fault, and so
+    are all faults in the definitions of a named message.
     """
     if not patterns:
         return library.names()
     found: set[MessageName] = set()
     for pattern in patterns:
-        names = list(_matching(library, pattern)) if set(pattern) & set("*?[") else _named(library, pattern)
+        try:
+            names = list(_matching(library, pattern)) if set(pattern) & set("*?[") else _named(library, pattern)
+        except InputError as error:
+            faults.take(error, None)
+            continue
         if not names:
-            fail(f"no message matches '{pattern}'", hint="'firm message list' lists all messages")
+            faults.error(f"no message matches '{pattern}'", hint="'firm message list' lists all messages")
         found |= set(names)
     return sorted(found)
 
@@ -97,6 +103,7 @@ class _Tasks:
     _waiting: dict[MessageName, list[MessageName]] = field(default_factory=dict)
     _results: dict[MessageName, Result] = field(default_factory=dict)
     _statistics: dict[MessageName, Statistics] = field(default_factory=dict)
+    _signatures: dict[MessageName, str] = field(default_factory=dict)
 
     def of(self, names: Iterable[MessageName]) -> Iterator[Task]:
         for name in names:
@@ -107,6 +114,7 @@ class _Tasks:
                 self.finished.append(Entry(name, self.library.ros, refused))
                 continue
             self._statistics[name] = statistics(name, definitions)
+            self._signatures[name] = signature(name, definitions)
             first = self._first.setdefault(frame_of(name, definitions).nodes, name)
             if first == name:
                 yield Task(name, definitions, **vars(self.settings))
@@ -118,14 +126,17 @@ class _Tasks:
     def entries(self, task: Task, result: Result) -> Iterator[Entry]:
         """Yield the entries of a task's message and of all messages that share the task."""
         self._results[task.name] = result
-        yield Entry(task.name, task.ros, result, self._statistics[task.name])
+        yield self._entry(task.name, result)
         for name in self._waiting.pop(task.name, ()):
             yield self._copy(name, task.name)
 
     def _copy(self, name: MessageName, first: MessageName) -> Entry:
         result = self._results[first]
         copied = replace(result, seconds=0.0, files={})
-        return Entry(name, self.library.ros, copied, self._statistics[name], first)
+        return self._entry(name, copied, first)
+
+    def _entry(self, name: MessageName, result: Result, same_as: MessageName | None = None) -> Entry:
+        return Entry(name, self.library.ros, result, self._statistics[name], same_as, self._signatures[name])
 
 
 def _first_fault(error: InputError) -> str:

@@ -85,7 +85,7 @@ def as_data(report: Report) -> dict[str, Any]:
 
 def _entry(entry: Entry) -> dict[str, Any]:
     result = entry.result
-    found: dict[str, Any] = {"name": str(entry.name), "ros": entry.ros.number}
+    found: dict[str, Any] = {"name": str(entry.name), "ros": entry.ros.number, "signature": entry.signature}
     if entry.statistics:
         found |= {name: int(value) for name, value in vars(entry.statistics).items()}
     if entry.same_as:

@@ -12,7 +12,7 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.runs.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.runs.verify.task import Result, Task, Verdict
-from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.tools.workers import Workers
 
 
@@ -37,7 +37,7 @@ def write(folder: Path, texts: dict[str, str]) -> MessageLibrary:
 
 
 def entries(library: MessageLibrary, workers: Workers) -> dict[str, Entry]:
-    found = list(run(library, select(library, ["a_msgs/*"]), Settings(), workers))
+    found = list(run(library, select(library, ["a_msgs/*"], Diagnostics()), Settings(), workers))
     by_name = {entry.name.name: entry for entry in found}
     assert len(by_name) == len(found)
     return by_name
@@ -67,7 +67,7 @@ def test_a_definition_that_is_none_is_refused_and_ends_nothing(tmp_path: Path) -
 
 def test_all_names_are_meant_if_none_is_given() -> None:
     library = MessageLibrary(ROS2)
-    assert select(library, []) == library.names()
+    assert select(library, [], Diagnostics()) == library.names()
 
 
 def test_patterns_and_names(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_patterns_and_names(tmp_path: Path) -> None:
     service = ["a_msgs/AddRequest", "a_msgs/AddResponse"]
 
     def names(*patterns: str) -> list[str]:
-        return [str(name) for name in select(library, patterns)]
+        return [str(name) for name in select(library, patterns, Diagnostics())]
 
     assert names("a_msgs/*") == names("a_msgs/srv/*") == names("a_msgs/srv/Add") == names("a_msgs/Add") == service
     assert names("a_msgs/AddR?sponse", "std_msgs/Bool") == ["a_msgs/AddResponse", "std_msgs/Bool"]
@@ -85,6 +85,8 @@ def test_patterns_and_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("pattern", ["geometry_msgs/Piont", "geometry_msgs/Piont*"])
-def test_what_means_no_message_is_an_error(pattern: str) -> None:
+def test_what_means_no_message_is_an_error_and_leaves_the_others(pattern: str) -> None:
+    faults = Diagnostics()
+    assert [str(name) for name in select(MessageLibrary(ROS1), [pattern, "std_msgs/Bool"], faults)] == ["std_msgs/Bool"]
     with pytest.raises(InputError, match=r"unknown message 'geometry_msgs/Piont'|no message matches"):
-        select(MessageLibrary(ROS1), [pattern])
+        faults.raise_if_any()

@@ -69,6 +69,7 @@ def test_the_data_say_all_of_a_message() -> None:
     assert data["messages"][0] == {
         "name": "a_msgs/A",
         "ros": 1,
+        "signature": "",
         "level": 1,
         "fields": 2,
         "types": 1,

@@ -25,8 +25,12 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Fixed, Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.runs.verify import simulation, task
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.runs.verify import command, simulation, task
+from fusesoc_firm.runs.verify.campaign import Entry
+from fusesoc_firm.runs.verify.complexity import statistics
 from fusesoc_firm.runs.verify.definitions import NoJudgementError
 from fusesoc_firm.runs.verify.judge import Judgement, judge
 from fusesoc_firm.runs.verify.task import Result, Task, Verdict, verify
@@ -351,3 +355,48 @@ def test_a_dask_cluster_gives_the_same(tmp_path: Path, capsys: Captured) -> None
             reports.append([{key: value for key, value in each.items() if key != "seconds"} for each in messages])
     assert reports[0] == reports[1]
     assert {each["verdict"] for each in reports[0]} >= {"pass"}
+
+
+def test_a_campaign_continues_after_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Captured
+) -> None:
+    """The verdicts until then are in the report, and are kept if the definitions are the same."""
+    folder = tmp_path / "a_msgs" / "msg"
+    folder.mkdir(parents=True)
+    for name in "ABC":
+        (folder / f"{name}.msg").write_text(f"uint8 {name.lower()}\n")
+    report, verified = tmp_path / "report.json", list[str]()
+
+    def pretend(_: MessageLibrary, names: Iterable[MessageName], *_others: object) -> Iterator[Entry]:
+        for name in names:
+            if name.name == "C" and not verified:
+                raise KeyboardInterrupt
+            definitions = MessageLibrary(ROS2, [tmp_path]).closure(name)
+            measures, signed = statistics(name, definitions), signature(name, definitions)
+            yield Entry(name, ROS2, Result(Verdict.PASS, seconds=1.0), measures, None, signed)
+
+    monkeypatch.setattr(command, "run", pretend)
+    in_threads(monkeypatch)
+    arguments = ["message", "verify", "a_msgs/*", "a_msgs/Missing", "--path", str(tmp_path), "--report", str(report)]
+    assert main(arguments) == 130
+    captured = capsys.readouterr()
+    assert "unknown message 'a_msgs/Missing'" in captured.err
+    assert "2 of 3 messages were verified; --resume continues" in captured.err
+    assert [item["name"] for item in json.loads(report.read_text())["messages"]] == ["a_msgs/A", "a_msgs/B"]
+    (folder / "B.msg").write_text("uint16 b\n")
+    verified.append("again")
+    kept: list[list[str]] = []
+
+    def noted(library: MessageLibrary, names: Iterable[MessageName], *others: object) -> Iterator[Entry]:
+        kept.append([str(name) for name in names])
+        return pretend(library, [parse_name(name) for name in kept[-1]], *others)
+
+    monkeypatch.setattr(command, "run", noted)
+    assert main([*arguments, "--resume"]) == 1
+    captured = capsys.readouterr()
+    assert kept == [["a_msgs/B", "a_msgs/C"]]
+    assert "3 of 3 messages, 0 failed" in captured.err
+    assert "the names above are unknown or invalid" in captured.err
+    assert json.loads(report.read_text())["totals"]["pass"] == 3
+    assert main([*arguments, "--resume", "--width", "16"]) == 1
+    assert "report.json has other width" in capsys.readouterr().err
