@@ -101,6 +101,9 @@ class _Reader:
                     if len(node.path) == depth:
                         return value  # the element is a string
                     put(message, node.path[depth:], value)
+        for path, elements in leaves.items():
+            if len(path) == depth:
+                return elements[0]  # the element is a number
         _put_leaves(message, leaves, depth)
         return message
 
@@ -140,6 +143,8 @@ class _Reader:
     def _loop(self, node: Loop) -> list[Any]:
         count = self._count(node) if node.count is None else node.count
         check_bound(node, count)
+        if node.number and len(node.body) == 1:
+            return list(self._numbers(node.number, count))
         return [self.read(node.body, len(node.path)) for _ in range(count)]
 
     def _count(self, node: Data | Loop) -> int:

@@ -86,7 +86,7 @@ def _whole_part(node: Data | Loop, value: Any, depth: int) -> Any:
         given = part_of(value, node, depth)
     except CodecError:
         return _part_as_sent(node, _whole)
-    if isinstance(node, Loop) and isinstance(given, list | tuple) and not _holds_texts(node):
+    if isinstance(node, Loop) and isinstance(given, list | tuple) and node.has_fields:
         return [_whole(node.body, item, len(node.path)) for item in given]
     return given
 
@@ -104,7 +104,7 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
                 put(sent, node.path[depth:], _part_as_sent(node, _as_sent))
             case Loop():
                 elements = part_of(value, node, depth)
-                if isinstance(elements, list | tuple) and not _holds_texts(node):
+                if isinstance(elements, list | tuple) and node.has_fields:
                     put(sent, node.path[depth:], [_as_sent(node.body, item, len(node.path)) for item in elements])
     return sent
 
@@ -115,12 +115,11 @@ def _part_as_sent(node: Data | Loop, element_of: Callable[[Sequence[Node], Any, 
         return node.default
     if isinstance(node, Data):
         return [] if node.kind is DataKind.ARRAY else ""
-    element = "" if _holds_texts(node) else element_of(node.body, {}, len(node.path))
+    if node.number:
+        element: Any = next(_defaults(node.number))
+    else:
+        element = "" if node.text else element_of(node.body, {}, len(node.path))
     return [element] * (node.count or 0)
-
-
-def _holds_texts(loop: Loop) -> bool:
-    return any(isinstance(node, Data) and node.path == loop.path for node in loop.body)
 
 
 def _defaults(leaf: FrameField) -> Iterator[Scalar]:

@@ -95,6 +95,9 @@ class _Writer:
         check_bound(node, len(value))
         if node.count is None:
             self._count(len(value))
+        if node.number and len(node.body) == 1:
+            self.payload += _pack(node.number.type, value, node.names)
+            return
         for element in value:
             self.write(node.body, element, len(node.path))
 

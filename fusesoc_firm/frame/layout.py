@@ -20,6 +20,7 @@ from fusesoc_firm.frame.model import (
     Step,
 )
 from fusesoc_firm.frame.position import Position
+from fusesoc_firm.message.bounds import is_streamed
 from fusesoc_firm.message.middleware import Definitions, MessageDefinition
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -65,7 +66,7 @@ class _Types:
         match type_:
             case ArrayType(element, length):
                 # An array without elements has no bytes.
-                return length == 0 or self.has_fixed_size(element)
+                return length == 0 or (self.has_fixed_size(element) and not is_streamed(type_, self.rules))
             case MessageType(name):
                 if name not in self._fixed:
                     fields = self.definitions[name].fields

@@ -144,7 +144,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Loop:
-    """An array of messages or strings: `body`, repeated for each element.
+    """An array of messages or strings, or a long fixed array of numbers: `body`, repeated for each element.
 
     `count` is the size of a fixed array, which is not sent. If `count` is None, a count (uint32) of at most `bound`
     precedes the elements. Paths in the body begin with the path of the loop.
@@ -163,6 +163,22 @@ class Loop:
     def names(self) -> tuple[str, ...]:
         """The names on the path."""
         return names_of(self.path)
+
+    @property
+    def text(self) -> Data | None:
+        """The element, if it is a string."""
+        return next((node for node in self.body if isinstance(node, Data) and node.path == self.path), None)
+
+    @property
+    def number(self) -> FrameField | None:
+        """The element, if it is a number: that of a long array of fixed size."""
+        fields = (leaf for node in self.body if isinstance(node, Fixed) for leaf in node.fields)
+        return next((leaf for leaf in fields if leaf.path == self.path), None)
+
+    @property
+    def has_fields(self) -> bool:
+        """True if the element is a message, neither a string nor a number."""
+        return self.text is None and self.number is None
 
 
 Node = Fixed | Pad | Data | Loop

@@ -31,7 +31,8 @@ class Extent:
 
     `levels` is 1 for a message without nested messages. `fields` includes the fields of nested messages; an array
     counts once. `nodes` also counts each element of a fixed array, unless the elements are numbers. `bytes` is the size
-    of the payload with empty strings and one element in each variable array, without padding.
+    of the payload with empty strings and one element in each variable array and in each fixed array that is a stream,
+    without padding.
     """
 
     levels: int = 0
@@ -56,6 +57,14 @@ _BOUNDS = {
     "nodes": (MOST_NODES, "fields, including those of each element in fixed arrays"),
     "bytes": (MOST_BYTES, "bytes of fixed size"),
 }
+
+
+def is_streamed(type_: ArrayType, rules: WireRules) -> bool:
+    """Return whether an array of fixed size is so long that its numbers are a stream, not registers."""
+    element = type_.element
+    if not isinstance(element, PrimitiveType) or element.name not in rules.scalars:
+        return False
+    return rules.scalars[element.name].size * type_.length > MOST_BYTES
 
 
 def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
@@ -95,6 +104,8 @@ def _of_type(type_: FieldType, rules: WireRules, known: Mapping[MessageName, Ext
         case MessageType(name):
             inner = known[name]
             return Extent(inner.levels + 1, inner.fields + 1, inner.nodes + 1, inner.bytes)
+        case ArrayType(element) if is_streamed(type_, rules):
+            return _of_type(element, rules, known)
         case ArrayType(element, length):
             one = _of_type(element, rules, known)
             is_of_numbers = isinstance(element, PrimitiveType) and element.name in rules.scalars

@@ -55,7 +55,8 @@ class _Values:
                             put_leaf(message, leaf.path[depth:], self._scalars(leaf.type.name))
                 case Data():
                     put(message, node.path[depth:], self._part(node))
-                case Loop():
+                case Loop() if not node.number:
+                    # A long array of numbers is omitted, so it is sent as zeros.
                     put(message, node.path[depth:], self._elements(node))
         return message
 
@@ -71,8 +72,9 @@ class _Values:
         size = sum(node.size if isinstance(node, Fixed) else self.beat for node in loop.body)
         wanted = self.beat // size + 1 + bool(self.beat) if size else 1
         elements = _bounded(wanted, loop.bound) if loop.count is None else loop.count
-        texts = [node for node in loop.body if isinstance(node, Data) and node.path == loop.path]
-        return [self._part(texts[0]) if texts else self.message(loop.body, len(loop.path)) for _ in range(elements)]
+        if loop.text:
+            return [self._part(loop.text) for _ in range(elements)]
+        return [self.message(loop.body, len(loop.path)) for _ in range(elements)]
 
     def _scalars(self, type_: str) -> Iterator[bool | int | float]:
         """Return legal values for the elements of a field; only `bool` values repeat soon."""

@@ -57,7 +57,8 @@ def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str
             case Loop() if node.is_used:
                 path = f"{above}{_shown(node.path[depth:])}"
                 yield path, node.ros_type
-                yield from _fields(node.body, f"{path}[].", len(node.path))
+                if node.has_fields:
+                    yield from _fields(node.body, f"{path}[].", len(node.path))
 
 
 def _shown(path: Path) -> str:
