@@ -286,7 +286,7 @@ def usual_size_of(project: Project, known: Libraries) -> Usual | None:
 def _max_length(project: Project, taken: Frame, known: Libraries) -> list[Context]:
     """Return the bytes of the longest payload and the reason, if the default is too small."""
     if project.stimuli and project.stimuli.longest > longest_payload(taken):
-        return [{"bytes": _power_of_two(project.stimuli.longest), "reason": "the longest payload in the bag"}]
+        return [{"bytes": _power_of_two(project.stimuli.longest), "reason": "as in the bag"}]
     usual = usual_size_of(project, known)
     return [{"bytes": usual.bytes, "reason": usual.example}] if usual else []
 
