@@ -12,13 +12,14 @@ import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.builds.setup.outcome import Build, Limits, Outcome, ignore
 from fusesoc_firm.builds.setup.process import Run, run_all, save_time
 from fusesoc_firm.builds.setup.recall import Recall, note_call, observed, unobserved
-from fusesoc_firm.builds.setup.steps import Steps
+from fusesoc_firm.builds.setup.steps import Steps, run_unstored
 from fusesoc_firm.tools import own_code
 from fusesoc_firm.tools.launcher import launcher_of_steps
 from fusesoc_firm.tools.library_path import library_root
@@ -91,7 +92,10 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
         return
     options += ["--setup", "--build"] * how.is_build_only
     words = (*options, *plan.options.options())
-    yield from _pool(plan, how, listener, words, how.steps or run_all).run(plan)
+    # Each simulation is judged as in `firm test`.
+    judged = partial(run_unstored, flags=plan.options.use_flags())
+    run = how.steps or (run_all if how.is_setup_only or how.is_build_only else judged)
+    yield from _pool(plan, how, listener, words, run).run(plan)
 
 
 def _build_on_cluster(plan: Plan, how: How, listener: Listener, options: list[str]) -> Generator[Outcome, None, None]:
@@ -166,9 +170,15 @@ def recall_or_build(
 
 
 def _set_launcher(how: How) -> None:
-    """Let this package start the programs of builds, unless another launcher is set."""
+    """Let this package start the programs of builds, unless another launcher is set.
+
+    Makefiles find programs of Python packages, such as cocotb-config, although the environment is not active.
+    """
     of_build = shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"])
     os.environ.setdefault(_LAUNCHER, launcher_of_steps() if how.steps else of_build)
+    search, beside = os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)
+    if beside not in search.split(os.pathsep):
+        os.environ["PATH"] = f"{search}{os.pathsep}{beside}"
 
 
 def _generators_run_here() -> bool:

@@ -13,14 +13,13 @@ from fusesoc_firm.builds.setup.folder_lock import FolderLock
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
+from fusesoc_firm.builds.step.bench import SIMULATORS
 from fusesoc_firm.core.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 TESTS = ("sim", "test")
 """The beginnings of the names of tests."""
 _COLONS_WITH_VERSION = 3
-# The simulators of Edalize's tool interface.
-_SIMULATORS = frozenset("ghdl icarus isim modelsim questaformal rivierapro vcs verilator vunit xcelium xsim".split())
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ def _tests(fusesoc: Any, name: str, further: Mapping[str, Any], selected: Collec
         if target.startswith(TESTS) or target in selected:
             flags = {**core.get_flags(target), "target": target, **further}
             flow = core.get_flow(flags)
-            if flow == "sim" or (not flow and flags.get("tool") in _SIMULATORS):
+            if flow == "sim" or (not flow and flags.get("tool") in SIMULATORS):
                 found[target] = flags
     return found
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -71,7 +72,7 @@ class Steps:
         report_of(build).unlink(missing_ok=True)
         if fusesoc.config.no_export:
             # The sources are not in the build's folder, so no step could be cached; the command line refuses a sandbox.
-            run_all(fusesoc, build, ("--setup", "--build", *(("--run",) if "run" in self.names else ()), *options))
+            run_unstored(fusesoc, build, options, dict(self.flags), is_build_only="run" not in self.names)
             return
         results = default_results()
         contents = results.contents()
@@ -131,6 +132,18 @@ def _is_in_place(build: Build, tree: Tree, found: list[tuple[Action, Record]], c
     for _, record in found:
         expected = after(record, expected)
     return build.work_root.is_dir() and tree_of(build.work_root, contents) == expected
+
+
+def run_unstored(
+    fusesoc: Any, build: Build, options: tuple[str, ...], flags: Mapping[str, Any], *, is_build_only: bool = False
+) -> None:
+    """Run a build without the store: its setup and build with FuseSoC, its run as a step; exit after a failure."""
+    run_all(fusesoc, build, ("--setup", "--build", *options))
+    if not is_build_only:
+        edam = f"{fusesoc.get_core(build.core).name.sanitized_name}{_EDAM}"
+        command = [sys.executable, *_BACKEND, "run", *backend_of(fusesoc, build, flags), edam]
+        if status := subprocess.run(command, cwd=build.work_root, check=False).returncode:
+            sys.exit(status)
 
 
 def write_report(build: Build, steps: Sequence[Step]) -> None:
