@@ -27,6 +27,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "scheduling": "text tools",
     "system": "converter core frame message scheduling text tools",
+    "cocotb": "converter frame message system",
     "fabric": "message system text tools",
     "accelerator": "converter frame netlist system text tools",
     "node": "accelerator core frame message system text tools",

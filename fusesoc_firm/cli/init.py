@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.scaffold.project import Project
 
 # The options that describe a new system, which an example already contains.
-_DESCRIBING = ("input", "output", "include", "ros", "language", "width", "from_bag", "limit")
+_DESCRIBING = ("input", "output", "include", "ros", "language", "width", "bench", "from_bag", "limit")
 _OPTIONS = {"input": "--in", "output": "--out", "from_bag": "--from-bag"}
 
 
@@ -64,6 +64,9 @@ def add_init(commands: Any) -> None:
     )
     init.add_argument(
         "--width", choices=[str(2**n) for n in range(3, 10)], help="width in bits of the streams (default: 8)"
+    )
+    init.add_argument(
+        "--bench", choices=("cocotb",), help="add a bench in cocotb, which 'firm test' runs (target test_cocotb)"
     )
     init.add_argument(
         "--from-bag",
@@ -139,6 +142,7 @@ def _start(arguments: argparse.Namespace) -> None:
     places = [recording.path] if recording and recording.has_definitions else []
     known = libraries([*arguments.path, *places], os.environ, arguments.distro)
     project = replace(_project(arguments, known, recording), include=tuple(arguments.include or ()))
+    project = replace(project, has_bench=bool(arguments.bench))
     if recording:
         project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))
     folder = Path(project.name)
@@ -149,7 +153,7 @@ def _start(arguments: argparse.Namespace) -> None:
         spec = folder / f"{project.name}.yaml"
         print(f"maxLength: messages of up to {usual.bytes} bytes ({usual.example}); change it in {spec}")
     print(f"edit: {folder / source} (the computation), {folder / 'model.py'} (the responses that it must give)")
-    print(f"next: cd {folder} && firm sim")
+    print(f"next: cd {folder} && firm sim{' && firm test' if project.has_bench else ''}")
 
 
 def _recording(arguments: argparse.Namespace) -> Recording | None:

@@ -18,7 +18,7 @@ _TOOLS = ("/bin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/opt", "
 _WRITABLE = ("/dev/full", "/dev/null", "/dev/pts", "/dev/tty", "/dev/zero", "/proc")
 _BYTE_CODE = "/__pycache__"
 # Parts of this package that a step runs. Other parts are only read to describe a build in its manifest.
-_PARTS = ("builds/step", "netlist", "text", "tools")
+_PARTS = tuple("builds/step cocotb converter frame message netlist system text tools".split())
 
 
 class _Below:

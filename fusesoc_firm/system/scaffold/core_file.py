@@ -27,6 +27,7 @@ from fusesoc_firm.tools.simulators import SIMULATORS, Simulator, default_simulat
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
+BENCH_TEMPLATE = "core/cocotb.core"
 
 # Yosys' names of FPGA families, with the options of the synth command: each family gets a target synth_<name>.
 FAMILIES = [
@@ -53,7 +54,10 @@ _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """The options of a new `.core` that the specification does not determine; paths are relative to the core."""
+    """The options of a new `.core` that the specification does not determine; paths are relative to the core.
+
+    `bench` is the name of a bench in cocotb, which reads specification, stimuli and model.
+    """
 
     name: str = ""
     description: str = ""
@@ -63,6 +67,7 @@ class CoreOptions:
     environment: Sequence[str] = ()
     paths: Sequence[str | Path] = ()
     distro: str = ""
+    bench: str = ""
 
 
 def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
@@ -97,9 +102,30 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
             "stimuli": options.stimuli,
             "model": options.model,
             "environment": {"files": _paths(options.environment)} if options.environment else None,
+            "bench": {"files": [options.bench, spec, options.stimuli, options.model]} if options.bench else None,
         },
     )
-    return head + _targets(system, is_simulated=True, has_environment=bool(options.environment))
+    targets = _targets(system, is_simulated=True, has_environment=bool(options.environment))
+    return head + targets + (_bench_targets(system, options.bench) if options.bench else "")
+
+
+def _bench_targets(system: DerivedSystem, bench: str) -> str:
+    """Return the targets of a bench in cocotb, of the simulators that cocotb drives without a C++ compiler."""
+    known = {
+        name: item for name, item in fitting(has_verilog=_has_verilog(system)).items() if "g++" not in item.programs
+    }
+    targets = [
+        {
+            "name": "test_cocotb" if is_first else f"test_cocotb_{name}",
+            "title": item.title,
+            "module": PurePosixPath(bench).stem,
+            "simulator": name,
+            "options": _options({**item.system_verilog, **item.options}),
+            "translated": None if item.reads_vhdl else {"unit": system.entity},
+        }
+        for is_first, (name, item) in zip((True, False, False), known.items(), strict=False)
+    ]
+    return render(BENCH_TEMPLATE, {"targets": targets})
 
 
 def updated_core(system: DerivedSystem, path: Path) -> str:
@@ -191,10 +217,9 @@ def _simulations(system: DerivedSystem, unit: str, kind: _Kind) -> Iterator[dict
 
     For simulators that do not read VHDL, the targets translate the design unit `unit` with all subunits.
     """
-    has_verilog = any(item.own.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
     is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
-    known = fitting(has_verilog=has_verilog, is_live=kind.is_live)
+    known = fitting(has_verilog=_has_verilog(system), is_live=kind.is_live)
     replaced = ", ".join(f"{name}: {value}" for name, value in kind.replaced.items())
     for name, item in known.items():
         is_first, is_default = item is next(iter(known.values())), name == default_simulator()
@@ -216,6 +241,10 @@ def _simulations(system: DerivedSystem, unit: str, kind: _Kind) -> Iterator[dict
             "options": _options(item.options),
             "toplevel": f"{system.entity}_{kind.suffix}",
         }
+
+
+def _has_verilog(system: DerivedSystem) -> bool:
+    return any(item.own.is_component for item in system.accelerator_types)
 
 
 def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:

@@ -78,7 +78,7 @@ class Project:
 
     An empty topic means the name of the block. Without `stimuli`, the project has generated examples. With `include`,
     the accelerator receives only these fields. If both messages are the same, it also sends only these fields, and the
-    others pass.
+    others pass. With `has_bench`, the project has a bench in cocotb.
     """
 
     name: str
@@ -91,6 +91,7 @@ class Project:
     output_topic: str = ""
     stimuli: RecordedStimuli | None = None
     include: tuple[str, ...] = ()
+    has_bench: bool = False
 
 
 def name_fault(name: str) -> str | None:
@@ -164,10 +165,21 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
     if project.include and LANGUAGES[project.language].type == SOFTWARE:
         hint = "omit --include, or choose vhdl, verilog or hls"
         fail("an accelerator in Python receives whole messages, so it cannot have --include", hint=hint)
+    if project.has_bench:
+        _check_bench(project, paths)
     with new_folder(folder) as inner:
         _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
         write_surroundings(inner, project.name, library)
     return files_of(folder)
+
+
+def _check_bench(project: Project, paths: Sequence[Path]) -> None:
+    """Raise `InputError` for a project that a bench in cocotb cannot test."""
+    if project.language not in ("vhdl", "verilog"):
+        fail(f"cocotb cannot test an accelerator in {project.language}", hint="omit --bench, or choose vhdl or verilog")
+    if project.stimuli or paths:
+        hint = "omit --bench, or --from-bag and --path"
+        fail("a bench in cocotb finds only messages of ROS and of the type stores, and stimuli in YAML", hint=hint)
 
 
 @contextmanager
@@ -224,6 +236,10 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     else:
         write(folder / _STIMULI, first_stimuli(_SUBSCRIBER, taken, project.width))
     write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
+    bench = f"test_{project.name}.py" if project.has_bench else ""
+    if bench:
+        names = {"name": project.name, "spec": spec.name, "stimuli": _STIMULI}
+        write(folder / bench, render("project/cocotb_bench.py", names))
     core = spec.with_suffix(".core")
     description = f"{project.input} to {project.output}"
     options = CoreOptions(
@@ -231,6 +247,7 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
         depend=[_ARITHMETIC] if has_arithmetic else (),
         paths=paths,
         stimuli=stimuli.name if stimuli else _STIMULI,
+        bench=bench,
     )
     write(core, new_core(loaded.system, spec.name, options))
 
