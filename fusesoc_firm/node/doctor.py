@@ -48,6 +48,11 @@ class _FaultError(Exception):
         self.remedy = remedy
 
 
+def is_board(root: Path) -> bool:
+    """Return whether the machine has a device tree, like all boards with a processor beside the FPGA."""
+    return (root / _TREE).is_dir()
+
+
 def examine(root: Path = Path("/")) -> list[Finding]:
     """Return the state of each subject; all paths begin with `root`."""
     findings: dict[str, Finding] = {}

