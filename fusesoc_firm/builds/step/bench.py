@@ -18,6 +18,7 @@ from fusesoc_firm.builds.step.report import fault_in
 # The simulators of Edalize's tool interface.
 SIMULATORS = frozenset("ghdl icarus isim modelsim questaformal rivierapro vcs verilator vunit xcelium xsim".split())
 _REPORT = "results.xml"
+_SEED = "1"
 _MODES_WITHOUT_RUN = frozenset("lint-only preprocess-only dpi-hdr-only xml-only".split())
 
 
@@ -81,6 +82,9 @@ class Cocotb(Reported):
         os.environ["COCOTB_RESULTS_FILE"] = _REPORT
         if not shutil.which("cocotb-config"):
             raise RuntimeError("the program 'cocotb-config' is not installed: pip install cocotb")
+        # The result of a step must follow from its inputs, to which these variables belong.
+        seed = "RANDOM_SEED" if _config("--version").startswith("1.") else "COCOTB_RANDOM_SEED"
+        os.environ.setdefault(seed, os.environ.get("RANDOM_SEED", _SEED))
         if "GPI_USERS" not in os.environ and (entry := _config("--pygpi-entry-point")):
             os.environ["GPI_USERS"] = f"{_config('--libpython')};{entry}"
 

@@ -21,14 +21,15 @@ FILE, PROGRAM, LINK, FOLDER = "file", "program", "link", "folder"
 _PRIVATE = ("generator_cache", "generated")
 # Our launcher's notes of paths, and records of steps.
 _NOTES = (".firm_noted",)
-# GHDL writes the time of analysis into a library, and Verilator the times of its inputs. Yosys and nextpnr log their
-# durations.
+# GHDL writes the time of analysis into a library, and Verilator the times of its inputs. Yosys, nextpnr and the reports
+# of cocotb, VUnit and pytest contain durations.
 _STAMPS: dict[str, re.Pattern[bytes]] = {
     ".cf": re.compile(rb'"\d{14}\.\d{3}"'),
     # The origins of cores, which no flow uses.
     ".eda.yml": re.compile(rb"^(?:cores|dependencies):\n(?:[ -].*\n)*", re.MULTILINE),
     "yosys.log": re.compile(rb"^(?:End of script\.|Time spent:|ABC: Total runtime|ABC: elapse:).*$", re.MULTILINE),
     "next.log": re.compile(rb"\b\d+\.\d\d(?:s\b| +\d+\.\d\d\|)"),
+    "results.xml": re.compile(rb'\b(?:time|timestamp|ratio_time)="[^"]*"|<property name="sim_time_ratio"[^>]*>'),
     "__verFiles.dat": re.compile(rb"(?<=[CST] ) *\d+ +\d+ +\d+ +\d+ +\d+ +\d+"),
 }
 
