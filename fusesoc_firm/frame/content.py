@@ -1,15 +1,29 @@
-"""Find the end of a message in its payload, since senders may append bytes.
+"""Find the end of a message in its payload, since senders of ROS 2 may append bytes.
 
-`rclpy.serialization.serialize_message` returns its whole buffer, up to some 100 bytes more than the message.
+`rclpy.serialization.serialize_message` returns its whole buffer, up to some 100 bytes more than the message. What a
+node must know of a definition for this is a list of numbers, which generated nodes contain and
+`node/cpp/firm/content.hpp` reads, too: the length of the prefix, the number of its checked bytes, these bytes, and
+terms:
+
+    n > 0                                       n bytes
+    -a                                          padding to a multiple of `a`, counted from the end of the prefix
+    0, count, terminator, stride, size, body    `size` numbers of terms, repeated
+
+If a repetition's `count` is `COUNTED`, the four bytes before it are the count, which includes `terminator`. `stride` is
+the size of each element after the first, or `VARYING` if the sizes differ.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
-from fusesoc_firm.frame.length import Align, Bytes, Length, Repeat, Term, length_of
+from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, length_of
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, Frame
+
+Content = tuple[int, ...]
+REPEAT = 0
+COUNTED = VARYING = -1
 
 
 def trimmed(frame: Frame, payload: bytes) -> bytes:
@@ -18,61 +32,79 @@ def trimmed(frame: Frame, payload: bytes) -> bytes:
     A payload of another encoding, or one that ends within its message, is returned unchanged, so that its reader
     reports the fault.
     """
-    has_content = payload[: frame.checked_prefix] == frame.prefix[: frame.checked_prefix]
-    if not (frame.trailing_bytes and has_content):
-        return payload
-    return payload[: content_bytes(frame, payload)]
-
-
-def content_bytes(frame: Frame, payload: bytes) -> int:
-    """Return the length of the message that begins the payload, from the counts in it.
-
-    For a payload that ends within its message, the result is any number above the payload's length.
-    """
-    length = _length_of(frame)
-    return length.prefix + _Walk(length.prefix, payload).behind(length.terms, 0)
+    return without_tail(content_of(frame), payload)
 
 
 @lru_cache(maxsize=1024)
-def _length_of(frame: Frame) -> Length:
-    return length_of(frame)
+def content_of(frame: Frame) -> Content:
+    """Return the numbers from which `without_tail` finds the end of a message; none if senders append no bytes."""
+    if not frame.trailing_bytes:
+        return ()
+    checked = frame.prefix[: frame.checked_prefix]
+    return (len(frame.prefix), len(checked), *checked, *_numbers(length_of(frame).terms))
+
+
+def without_tail(content: Content, payload: bytes) -> bytes:
+    """Return a payload without the bytes after the message that `content` describes, like `trimmed`."""
+    if not content:
+        return payload
+    prefix, checked = content[:2]
+    if payload[:checked] != bytes(content[2 : 2 + checked]):
+        return payload
+    walk = _Walk(content, prefix, payload)
+    return payload[: prefix + walk.behind(2 + checked, len(content), 0)]
+
+
+def _numbers(terms: Sequence[Term]) -> Iterator[int]:
+    for term in terms:
+        match term:
+            case Bytes(count):
+                yield count
+            case Align(alignment):
+                yield -alignment
+            case Repeat(part, body, stride):
+                count, terminator = (None, part.terminator) if isinstance(part, Data) else (part.count, 0)
+                inner = tuple(_numbers(body))
+                yield from (REPEAT, COUNTED if count is None else count, terminator)
+                yield from (VARYING if stride is None else stride, len(inner), *inner)
 
 
 class _Walk:
-    """An evaluation of terms with the counts of a payload; positions count from the end of the prefix."""
+    """A walk over the terms of a content with the counts of a payload; positions count from the end of the prefix."""
 
-    def __init__(self, prefix: int, payload: bytes) -> None:
+    def __init__(self, content: Content, prefix: int, payload: bytes) -> None:
+        self._content = content
         self._prefix = prefix
         self._payload = payload
         self._end = len(payload) - prefix
 
-    def behind(self, terms: Sequence[Term], position: int) -> int:
-        """Return the position after `terms`."""
-        for term in terms:
-            match term:
-                case Bytes(count):
-                    position += count
-                case Align(alignment):
-                    position += -position % alignment
-                case Repeat():
-                    position = self._behind_part(term, position)
+    def behind(self, place: int, last: int, position: int) -> int:
+        """Return the position after the terms from `place` to before `last`."""
+        while place < last:
+            number = self._content[place]
+            place += 1
+            if number > 0:
+                position += number
+            elif number != REPEAT:
+                position += -position % -number
+            else:
+                count, terminator, stride, size = self._content[place : place + 4]
+                place += 4
+                if count == COUNTED:
+                    count = max(self._count_before(position) - terminator, 0)
+                position = self._behind_elements(place, place + size, position, count, stride)
+                place += size
         return position
 
-    def _behind_part(self, term: Repeat, position: int) -> int:
-        count = self._count(term, position)
-        if count and term.stride is not None:
-            return self.behind(term.body, position) + (count - 1) * term.stride
+    def _behind_elements(self, place: int, last: int, position: int, count: int, stride: int) -> int:
+        if count and stride != VARYING:
+            return self.behind(place, last, position) + (count - 1) * stride
         for _ in range(count):
             if position > self._end:
                 break  # a count in a damaged payload can be billions
-            position = self.behind(term.body, position)
+            position = self.behind(place, last, position)
         return position
 
-    def _count(self, term: Repeat, position: int) -> int:
-        """Return the number of elements; the count before them is the end of the term before."""
-        part = term.part
-        if not isinstance(part, Data) and part.count is not None:
-            return part.count
+    def _count_before(self, position: int) -> int:
         end = self._prefix + position
-        count = int.from_bytes(self._payload[end - COUNT_BYTES : end], "little")
-        return max(count - part.terminator, 0) if isinstance(part, Data) else count
+        return int.from_bytes(self._payload[end - COUNT_BYTES : end], "little")

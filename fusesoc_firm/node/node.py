@@ -1,4 +1,6 @@
-"""The node, which carries messages from topics to the hardware as frames, and back, without parsing them.
+"""The node, which carries messages from topics to the hardware as frames, and back.
+
+It parses a message only as far as its end, to remove the bytes that senders of ROS 2 append.
 
     node = Node(description, open_transport, settings)
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails permanently
@@ -22,6 +24,7 @@ from functools import partial
 from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.frame.content import without_tail
 from fusesoc_firm.frame.faults import told
 from fusesoc_firm.node.actions.actions import NodeActions
 from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
@@ -373,6 +376,7 @@ class Node:
     def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
         """Add a message to a queue; if a full queue blocks, wait `timeout` seconds at most."""
         item, entry = self._inputs[number], None
+        payload = without_tail(self._description.contents.get(item.block, ()), payload)
         counts = self.statistics.inputs[item.block]
         if self._trace and item.id is not None:
             entry = Entry(item.id, len(payload), received_ns, time.monotonic_ns())

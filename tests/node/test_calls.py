@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,6 +14,8 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.select import with_names_in_use
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.node.engine.calls import MOST_WAITING, CallLine
@@ -290,3 +293,17 @@ def test_the_generated_file_has_the_services() -> None:
     names: dict[str, object] = {"__name__": "generated"}
     exec(compile(source, "camera_node.py", "exec"), names)
     assert names["NODE"] == DESCRIPTION
+
+
+def test_bytes_after_a_request_are_removed(tmp_path: Path) -> None:
+    text = (CAMERA.parent / "camera.yaml").read_text(encoding="utf-8")
+    copy = shutil.copytree(CAMERA.parent, tmp_path / "camera") / "camera.yaml"
+    copy.write_text(re.sub(r"\bROS\b", "ROS2", re.sub(r"Info(?=Re)", "Info_", text)), encoding="utf-8")
+    system = load_system(copy, LIBRARIES)
+    request = encode_used(with_names_in_use(system.system.subscribers[0].frame, ()), {})
+    server = Server()
+    run = Run(describe(system), server.open)
+    run.carrier.ask(0, Call(1, request + b"\xee" * 92))
+    until(lambda: server.hardware and server.hardware.sent)
+    run.stop()
+    assert server.hardware and server.hardware.sent == [(0, request)]

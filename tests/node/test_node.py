@@ -73,6 +73,17 @@ def test_messages_come_back_whole_and_in_order(tmp_path: Path) -> None:
     assert (counts.inputs["a0"].received, counts.inputs["a0"].sent, counts.outputs["z1"].published) == (40, 40, 40)
 
 
+def test_bytes_after_a_message_of_ros_2_are_removed(tmp_path: Path) -> None:
+    blocks = converter("a0", "subscriber", "std_msgs/String", "z0", ros="ROS2")
+    blocks += converter("z0", "publisher", "std_msgs/String", ros="ROS2")
+    bench = Bench()
+    run = Run(describe(loaded(tmp_path, specification(blocks))), bench.open)
+    text = bytes.fromhex("00010000 02000000 6100")
+    run.carrier.give(0, *(text + b"\xee" * more for more in (0, 3, 4, 200)), text[:-1])
+    run.stop()
+    assert bench.hardware.sent == [*[(0, text)] * 4, (0, text[:-1])]
+
+
 def test_a_message_that_nothing_delays_is_sent_at_once(tmp_path: Path) -> None:
     """The thread that takes it sends it; while the hardware is not ready, messages wait in queues, in order."""
     gate = threading.Event()

@@ -280,9 +280,10 @@ class Peer:
     def wait_until_connected(self) -> None:
         assert self._lines.get() == {"connected": True}
 
-    def publish(self, topic: str, payload: bytes) -> None:
+    def publish(self, topic: str, payload: bytes, *, is_raw: bool = False) -> None:
+        """Publish a message; in ROS 2, `is_raw` publishes these bytes, whatever is after the message in them."""
         assert self._process.stdin
-        line = {"topic": topic, "payload": base64.b64encode(payload).decode()}
+        line = {"topic": topic, "payload": base64.b64encode(payload).decode(), **({"raw": True} if is_raw else {})}
         self._process.stdin.write(json.dumps(line) + "\n")
         self._process.stdin.flush()
 

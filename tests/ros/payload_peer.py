@@ -3,11 +3,11 @@
     python payload_peer.py 1|2 '{"topic": "package/Type", ...}' '{"topic": "package/Type", ...}'
 
 The first topics are subscribed to, the others published. Words may follow a type: `latched`, of a topic that need not
-find somebody, and `depth=3`. A line `{"topic": ..., "payload": base64}` on its input is
-parsed by the message's own class and published; one like it on its output is a message that came, as that class
-serialises it. The first line on its output says that every topic has found somebody. A line `{"sync": ...}` comes back
-when all before it is published, and in ROS 2, `{"acked": true}` when every subscriber has received it. It needs nothing
-but ROS.
+find somebody, and `depth=3`. A line `{"topic": ..., "payload": base64}` on its input is parsed by the message's own
+class and published, or in ROS 2 with `"raw": true` published as it is; one like it on its output is a message that
+came, as that class serialises it. The first line on its output says that every topic has found somebody. A line
+`{"sync": ...}` comes back when all before it is published, and in ROS 2, `{"acked": true}` when every subscriber has
+received it. It needs nothing but ROS.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def say_message(topic: str, payload: bytes) -> None:
     say({"topic": topic, "payload": base64.b64encode(payload).decode()})
 
 
-def commands(wait_until_acked: Callable[[], None] | None = None) -> Iterator[tuple[str, bytes]]:
-    """The messages to publish, until the input ends."""
+def commands(wait_until_acked: Callable[[], None] | None = None) -> Iterator[tuple[str, bytes, bool]]:
+    """The messages to publish, and whether as they are, until the input ends."""
     for line in sys.stdin:
         command = json.loads(line)
         if "sync" in command:
@@ -46,7 +46,7 @@ def commands(wait_until_acked: Callable[[], None] | None = None) -> Iterator[tup
             wait_until_acked()
             say(command)
         else:
-            yield command["topic"], base64.b64decode(command["payload"])
+            yield command["topic"], base64.b64decode(command["payload"]), "raw" in command
 
 
 class Wish:
@@ -92,7 +92,7 @@ class Ros1Peer:
         while not self.is_connected():
             time.sleep(0.02)
         say({"connected": True})
-        for topic, payload in commands():
+        for topic, payload, _ in commands():
             publisher, message = self.publishers[topic]
             publisher.publish(message().deserialize(payload))
 
@@ -152,8 +152,8 @@ class Ros2Peer:
     def publish_all(self) -> None:
         from rclpy.serialization import deserialize_message
 
-        for topic, payload in commands(self.wait_until_acked):
-            self.publishers[topic].publish(deserialize_message(payload, self.types[topic]))
+        for topic, payload, is_raw in commands(self.wait_until_acked):
+            self.publishers[topic].publish(payload if is_raw else deserialize_message(payload, self.types[topic]))
         self.rclpy.shutdown()
 
     def run(self) -> None:

@@ -236,6 +236,26 @@ def test_a_message_of_any_size_goes_through(workshop: Workshop) -> None:
         assert node.stop(signal.SIGTERM) == 0
 
 
+def test_bytes_after_a_message_do_not_reach_the_hardware(workshop: Workshop) -> None:
+    if workshop.ros.version == 1:
+        pytest.skip("publishers of ROS 1 append nothing")
+    trace = workshop.folder / "tails.csv"
+    sizes: list[int] = []
+    with (
+        Node(workshop.ros, workshop.program("echo"), ECHO_SIMULATOR, "--trace", str(trace)) as node,
+        workshop.echo_peer() as peer,
+    ):
+        peer.wait_until_connected()
+        for more in (0, 4, 92, 200):
+            payload = workshop.image(100, more)
+            peer.publish("/image_in", payload + b"\xee" * more, is_raw=True)
+            sizes.append(len(payload))
+            assert peer.take()[0] == "/image_out"
+        assert node.stop() == 0
+    rows = csv.DictReader(trace.open(encoding="utf-8"))
+    assert [int(row["bytes"]) for row in rows if row["event"] == "sent"] == sizes
+
+
 @only_ros1
 def test_an_image_of_six_megabytes_goes_through_hardware(workshop: Workshop) -> None:
     """Through multi_type, where it is passed on as it comes, beside a topic of no bytes that goes straight through."""

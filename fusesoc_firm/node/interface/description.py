@@ -1,14 +1,16 @@
 """The system from the node's view: its topics, and the topics' converters in the hardware.
 
-A payload is a message as serialised by the middleware, so the node needs only a table of names and ids.
+A payload is a message as serialised by the middleware, so the node needs only a table of names and ids, and where each
+message ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 from fusesoc_firm.accelerator.software import sent_elsewhere, taken_elsewhere, way_to
+from fusesoc_firm.frame.content import Content, content_of
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.node.interface.action_types import NodeAction, node_action
 from fusesoc_firm.node.interface.services import NodeService, node_service
@@ -33,7 +35,8 @@ class NodeDescription:
     The node takes messages from the topics of `subscribers` and publishes messages on the topics of `publishers`.
     Software on this host, and the ends of `services` and `actions`, send to the hardware through `entering` and receive
     from the hardware through `leaving`. For each publisher in hardware, `sources` lists the ids of the subscribers
-    whose messages cause the publisher's messages. `longest_payload` is the size in bytes of the longest payload from
+    whose messages cause the publisher's messages. `contents` tells the end of the messages that each subscriber in
+    hardware takes, by block. `longest_payload` is the size in bytes of the longest payload from
     any publisher, or None without a bound. `clock_hz` is None if the specification has no clock. `digest` is that of
     the hardware's identity, or empty if the hardware has no status. With `has_status_registers`, the status is a port
     for AXI4-Lite; otherwise frames read it.
@@ -46,6 +49,7 @@ class NodeDescription:
     sources: tuple[tuple[int, ...], ...]
     entering: tuple[Crossing, ...] = ()
     leaving: tuple[Crossing, ...] = ()
+    contents: Mapping[str, Content] = field(default_factory=dict)
     longest_payload: int | None = None
     clock_hz: float | None = None
     digest: str = ""
@@ -124,6 +128,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         ),
         entering,
         leaving,
+        {str(item.block): content_of(item.frame) for item in system.subscribers},
         max(length for length in lengths if length is not None) if None not in lengths else None,
         None if system.clock is None else float(system.clock),
         identity(loaded).digest if system.status else "",

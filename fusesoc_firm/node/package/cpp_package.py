@@ -165,6 +165,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "publishers": [_row(topic) for topic in description.publishers],
         "diagnostics": _row(diagnostics_topic(description.versions[0])),
         "channels": channel_names(description) if description.digest else [],
+        "contents": [", ".join(map(str, description.contents[item.block])) for item in loaded.system.subscribers],
         "software": _software(loaded, description),
         "has_services": bool(description.services or description.actions),
         "services": [*map(partial(_service, description), description.services)],

@@ -93,6 +93,7 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "sources": repr(description.sources),
         "entering": [{"block": str(item.block), "id": item.id} for item in description.entering],
         "leaving": [{"block": str(item.block), "id": item.id} for item in description.leaving],
+        "contents": [{"block": block, "numbers": repr(content)} for block, content in description.contents.items()],
         "longest_payload": repr(description.longest_payload),
         "clock_hz": repr(description.clock_hz),
         "digest": description.digest,

@@ -30,6 +30,7 @@
 #include <vector>
 
 #include <firm/bursts.hpp>
+#include <firm/content.hpp>
 #include <firm/faults.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/queues.hpp>
@@ -44,6 +45,8 @@ struct NodeConfiguration {
   unsigned subscribers = 1;
   unsigned publishers = 1;
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
+  // By subscriber: how a payload shows the end of its message, after which senders may append bytes. put() removes them.
+  std::vector<Content> contents{};
   std::size_t queue_depth = 100;            // frames, for each subscriber
   // Frames, for subscribers with another depth; kUnlimitedDepth: no frame is dropped.
   std::map<unsigned, std::size_t> queue_depths{};
@@ -108,6 +111,9 @@ class Node {
     if (subscriber >= configuration_.subscribers) {
       throw std::out_of_range("subscriber is " + std::to_string(subscriber) + "; legal: 0 to " +
                               std::to_string(configuration_.subscribers - 1));
+    }
+    if (subscriber < configuration_.contents.size()) {
+      size = content_size(configuration_.contents[subscriber], payload, size);
     }
     if (size > configuration_.longest_payload) {
       throw std::length_error("a payload for subscriber " + std::to_string(subscriber) + " has " +

@@ -64,6 +64,7 @@ struct System {
   std::vector<Topic> publishers;
   Topic diagnostics;
   std::vector<std::string> channels{};  // of the status, the subscribers first
+  std::vector<Content> contents{};      // of the messages of subscribers, by id
   Software software{};
   std::vector<Service> services{};
   std::vector<Action> actions{};
@@ -287,6 +288,7 @@ class Engines {
     configuration.width = system.width;
     configuration.subscribers = system.subscriber_count;
     configuration.publishers = system.publisher_count;
+    configuration.contents = system.contents;
     configuration.queue_depth = arguments.depth.value_or(system.queue_depth);
     for (const auto& topic : system.subscribers) {
       if (topic.id) configuration.queue_depths[*topic.id] = arguments.quality_of(topic).depth;
@@ -338,6 +340,7 @@ class Engines {
     configuration.has_status = false;
     configuration.on_rejected = configuration.on_aborted = nullptr;
     configuration.on_restart = configuration.on_rest = nullptr;
+    configuration.contents.clear();
     configuration.queue_depths.clear();
     configuration.shared_queues.clear();
     software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
