@@ -27,6 +27,7 @@ from fusesoc_firm.system.derived.status import STATUS_ID
 from fusesoc_firm.system.hardware.status import status_map
 from fusesoc_firm.system.status_frames import answered, read_request, status_answer
 from tests.node.fake_node import Run, echo, pairs, until
+from tests.node.strangers import reply_to_stranger
 from tests.node.test_node import POINTS, Bench
 
 MAP = {register.address: register for register in status_map("robot", 2, 2).registers}
@@ -162,6 +163,12 @@ def test_a_silent_peer_does_not_keep_others_out(served: Served, monkeypatch: pyt
     monkeypatch.setattr(status_socket, "_SILENCE_SECONDS", 0.05)
     with open_status(served.name), open_status(served.name) as second:
         assert read_word(second, 0) == 0x4D524946
+
+
+def test_a_node_of_root_answers_no_other_user(served: Served) -> None:
+    assert reply_to_stranger(served.name) == ""
+    with open_status(served.name) as transport:
+        assert read_word(transport, 0) == 0x4D524946
 
 
 def test_another_node_with_the_name_is_reported(served: Served) -> None:

@@ -8,8 +8,8 @@
 
 The sockets are abstract sockets of Linux, so that a killed node leaves no files. They are named after the node's system
 (`node:robot`) and after the device of its transport. A packet is a request; the reply is the answer of the hardware, or
-the reason of a failure as text. Both sides refuse peers of other users except root. `cpp/firm/status_server.hpp` is the
-C++ version of the server.
+the reason of a failure as text. Both sides refuse peers of other users except root; root itself may ask any node.
+`cpp/firm/status_server.hpp` is the C++ version of the server.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class StatusServer(Closing):
         while self._stopped not in (ready := select.select([self._stopped, *self._listeners], [], [])[0]):
             peer, _ = ready[0].accept()
             with peer, suppress(OSError):
-                if _is_trusted(peer):
+                if _user_of(peer) in (0, os.geteuid()):
                     self._answer(peer)
 
     def _answer(self, peer: socket.socket) -> None:
@@ -166,7 +166,7 @@ def _connected(name: str) -> socket.socket | None:
     try:
         if len(name.encode()) <= _LONGEST_NAME:
             peer.connect(_PREFIX + name.encode())
-            if _is_trusted(peer):
+            if os.geteuid() == 0 or _user_of(peer) in (0, os.geteuid()):
                 return peer
     except ConnectionRefusedError:
         pass
@@ -177,8 +177,8 @@ def _connected(name: str) -> socket.socket | None:
     return None
 
 
-def _is_trusted(peer: socket.socket) -> bool:
-    """Return whether the other process belongs to this user or to root, or whether this process is root's."""
+def _user_of(peer: socket.socket) -> int:
+    """Return the number of the user to whom the other process belongs."""
     form = "3i"
     _, user, _ = struct.unpack(form, peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize(form)))
-    return user in (0, os.geteuid()) or os.geteuid() == 0
+    return int(user)
