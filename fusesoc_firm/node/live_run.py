@@ -94,7 +94,9 @@ def run_node(
     try:
         with ExitStack() as stack:
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
-            trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
+            trace = (
+                stack.enter_context(closing(Trace(options.trace, description, report=_say))) if options.trace else None
+            )
             registers = status_registers(description, options.status, address)
             settings = replace(options.settings, report=_say, registers=registers)
             node = Node(description, checked(open_transport, description, registers), settings, software, trace)

@@ -22,6 +22,7 @@ from fusesoc_firm.node.status.status_socket import open_status
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.status_frames import write_request
 from tests.node.drivers import HERE, Driver, cpp_driver
+from tests.node.strangers import reply_to_stranger
 from tests.seeds import seeded
 
 SEED = seeded(20261121)
@@ -102,6 +103,26 @@ def test_what_is_put_comes_back_whole_and_in_order(node_driver: Driver, width: i
     assert outcome.said["status"] == "0", outcome.said
     assert outcome.published == by_converter(messages)
     assert (outcome.count("sent"), outcome.count("errors"), outcome.count("dropped")) == (300, 0, 0)
+
+
+def test_a_node_of_root_answers_no_other_user() -> None:
+    name = f"node:model_{uuid4().hex[:8]}"
+    arguments = [f"pipe:{SIMULATOR}", "8", "2", "2", "10", "block", "0", "20000", "", name]
+    command = [str(cpp_driver("node").program), *arguments]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout and program.stdout.readline() == "serves\n"
+        reply = reply_to_stranger(name)
+        program.communicate()
+    assert reply == ""
+
+
+def test_a_full_disk_ends_the_trace_but_not_the_node(node_driver: Driver) -> None:
+    source = random.Random(SEED)
+    messages = payloads_of(source, 2, 300, 100)
+    outcome = run(node_driver, puts(messages), f"pipe:{SIMULATOR}", trace=Path("/dev/full"))
+    assert outcome.said["status"] == "0"
+    assert outcome.published == by_converter(messages)
+    assert outcome.log == ["the trace ends, since it cannot be written"]
 
 
 def test_large_and_empty_payloads(node_driver: Driver) -> None:

@@ -572,6 +572,20 @@ def test_a_watch_tells_how_full_the_queues_are(tmp_path: Path) -> None:
     assert run.node.statistics.inputs["a0"].dropped == 6
 
 
+def test_a_full_disk_ends_the_trace_but_not_the_node(tmp_path: Path) -> None:
+    """As many messages as fill the buffer of the file, twice."""
+    description, reports = describe(pairs(tmp_path)), list[str]()
+    trace = Trace(Path("/dev/full"), description, report=reports.append)
+    run = Run(description, Bench().open, NodeSettings(depth=1000), trace=trace)
+    for _ in range(10):
+        run.carrier.give(0, *POINTS)
+    run.stop()
+    trace.close()
+    assert run.is_complete and run.error is None
+    assert run.node.statistics.outputs["z0"].published == 400
+    assert reports == ["the trace ends, since /dev/full cannot be written: No space left on device"]
+
+
 def test_the_trace_knows_what_got_no_answer(tmp_path: Path) -> None:
     """A refused message has none, and those behind it keep theirs."""
     description = describe(pairs(tmp_path))

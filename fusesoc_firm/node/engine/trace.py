@@ -15,6 +15,7 @@ from __future__ import annotations
 import csv
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -78,18 +79,23 @@ class Trace:
     """The writer of the table; any thread may report events. Times count from the creation of the `Trace`."""
 
     def __init__(
-        self, path: Path | None, description: NodeDescription, clock: Callable[[], int] = monotonic_ns
+        self,
+        path: Path | None,
+        description: NodeDescription,
+        clock: Callable[[], int] = monotonic_ns,
+        report: Callable[[str], None] = print,
     ) -> None:
         """Create the file at `path`; `clock` returns the time in ns. May raise `InputError`.
+
+        If the file cannot be written later, such as on a full disk, the trace ends with a message to `report`.
 
         Without a path, nothing is written, and the messages that wait for a response are bounded: the oldest are
         dropped.
         """
         self._file = _created(path) if path else None
         self._most = None if path else _MOST_PENDING
-        self._rows = csv.writer(self._file, lineterminator="\n") if self._file else None
-        if self._rows:
-            self._rows.writerow(COLUMNS)
+        self._report = report
+        self._write_row(COLUMNS)
         self._description = description
         self._subscribers, self._publishers = converter_names(description)
         self._reached: dict[int, list[int]] = {}
@@ -166,7 +172,10 @@ class Trace:
         with self._lock:
             self._write_rest()
             if self._file:
-                self._file.close()
+                try:
+                    self._file.close()
+                except OSError as error:
+                    self._give_up(error)
 
     def _cause(self, publisher: int) -> Entry | None:
         queues = [self._ways.pending.get((source, publisher)) for source in self._description.sources[publisher]]
@@ -185,13 +194,13 @@ class Trace:
                 self._write(entry, None, None)
 
     def _write(self, entry: Entry | None, answer: _Answer | None, published_ns: int | None) -> None:
-        if not self._rows:
+        if not self._file:
             return
         came = answer.came_ns if answer else None
         times = (entry.received_ns, entry.queued_ns, entry.sent_ns) if entry else (None,) * 3
         inwards = (entry.cycles if entry else None) or (None, None)
         outwards = (answer.cycles if answer else None) or (None, None)
-        self._rows.writerow(
+        self._write_row(
             (
                 entry.number if entry else None,
                 self._subscribers[entry.subscriber] if entry else None,
@@ -204,6 +213,21 @@ class Trace:
                 *self._differences((*inwards, *outwards)),
             )
         )
+
+    def _write_row(self, row: Iterable[object]) -> None:
+        if self._file:
+            try:
+                csv.writer(self._file, lineterminator="\n").writerow(row)
+            except OSError as error:
+                self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        """Write no more rows, since a node is worth more than its trace."""
+        if self._file:
+            with suppress(OSError):
+                self._file.close()
+            self._report(f"the trace ends, since {self._file.name} cannot be written: {error.strerror}")
+            self._file = None
 
     def _differences(self, cycles: Iterable[int | None]) -> tuple[float | None, ...]:
         """Return the cycles between successive beats, and the time from the first beat to the last."""

@@ -91,7 +91,7 @@ class Node {
         publish_(std::move(publish)),
         queues_(depths(configuration_),
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
-        trace_(configuration_.trace),
+        trace_(configuration_.trace, configuration_.log),
         status_([this](const Bytes& request) { put_request(request); }) {
     for (const auto& [subscriber, other] : configuration_.shared_queues) queues_.share(subscriber, other);
   }

@@ -10,6 +10,7 @@
 //     first_cycle, last_cycle    of the beats of the frame or burst, otherwise empty
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -24,10 +25,19 @@ namespace firm {
 
 class Trace {
  public:
-  // Without a stream, nothing is written.
-  explicit Trace(std::ostream* stream) : stream_(stream) {
-    if (stream_) *stream_ << "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n";
+  // Without a stream, nothing is written. If the stream fails, such as on a full disk, the trace ends with a line in
+  // `log`.
+  explicit Trace(std::ostream* stream, std::ostream* log = nullptr) : stream_(stream), log_(log) {
+    if (stream_) *stream << "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n";
   }
+
+  ~Trace() {
+    if (!stream_) return;
+    stream_.load()->flush();
+    end_if_failed();
+  }
+  Trace(const Trace&) = delete;
+  Trace& operator=(const Trace&) = delete;
 
   void write(const char* event, unsigned converter, std::uint64_t message, std::size_t bytes,
              const std::optional<Cycles>& cycles = std::nullopt) {
@@ -73,15 +83,25 @@ class Trace {
   };
 
   void write_line(const char* event, const Message& message, const std::optional<Cycles>& cycles) {
-    *stream_ << steady_nanoseconds() << ',' << event << ',' << message.converter << ',' << message.number << ','
-             << message.bytes << ',';
-    if (cycles) *stream_ << cycles->first;
-    *stream_ << ',';
-    if (cycles) *stream_ << cycles->last;
-    *stream_ << '\n';
+    std::ostream* const stream = stream_;
+    if (!stream) return;
+    *stream << steady_nanoseconds() << ',' << event << ',' << message.converter << ',' << message.number << ','
+            << message.bytes << ',';
+    if (cycles) *stream << cycles->first;
+    *stream << ',';
+    if (cycles) *stream << cycles->last;
+    *stream << '\n';
+    end_if_failed();
   }
 
-  std::ostream* stream_;
+  void end_if_failed() {
+    if (stream_.load()->good()) return;
+    stream_ = nullptr;
+    if (log_) *log_ << "the trace ends, since it cannot be written" << std::endl;
+  }
+
+  std::atomic<std::ostream*> stream_;
+  std::ostream* log_;
   std::mutex mutex_;
   std::deque<std::optional<Message>> sent_;  // but not yet taken; nothing for other frames
 };
