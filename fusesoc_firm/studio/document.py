@@ -5,18 +5,36 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from io import FileIO
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from fusesoc_firm.studio.edits import edited
 from fusesoc_firm.text.diagnostics import fail
-from fusesoc_firm.text.files import read_regular, write_whole
+from fusesoc_firm.text.files import read_regular, replace_content
 from fusesoc_firm.text.yaml_edit import EditError
 from fusesoc_firm.text.yaml_text import SMALL
 
 _BYTE_ORDER_MARK = "\ufeff"
+_CHANGED = "the file has changed meanwhile"
+_LATE_SECONDS = 2.0
 # The number of edits that can be undone.
 _MOST_STEPS = 1000
+
+
+@dataclass(frozen=True)
+class _Former:
+    """The file that an edit of the page has replaced, with its content.
+
+    An editor that was opening it saves to it still, until about the time `end`.
+    """
+
+    file: FileIO
+    content: bytes
+    end: float = field(default_factory=lambda: monotonic() + _LATE_SECONDS)
 
 
 class Document:
@@ -27,7 +45,7 @@ class Document:
         self.path = path
         self.text = ""
         self._mark = ""
-        self._time = -1
+        self._former: _Former | None = None
         self._undone: list[str] = []
         self._done: list[str] = []
         self.follow()
@@ -48,17 +66,17 @@ class Document:
         return bool(self._undone)
 
     def follow(self) -> bool:
-        """Read the file if it has changed, and return whether its text differs. May raise `InputError`."""
+        """Read the file, and return whether its text differs. May raise `InputError`.
+
+        Times do not tell whether it does: two changes can have the same time.
+        """
+        self._recover()
         try:
-            time = self.path.stat().st_mtime_ns
-            if time == self._time:
-                return False
             text = read_regular(self.path, SMALL.bytes).decode()
         except OSError as error:
             fail(f"cannot read {self.path}: {error.strerror}")
         except UnicodeDecodeError:
             fail(f"cannot read {self.path}: it is not UTF-8")
-        self._time = time
         self._mark = _BYTE_ORDER_MARK if text.startswith(_BYTE_ORDER_MARK) else ""
         text = text.removeprefix(_BYTE_ORDER_MARK)
         if text == self.text:
@@ -106,16 +124,43 @@ class Document:
     def _check(self, version: str) -> None:
         self.follow()
         if version != self.version:
-            raise EditError("the file has changed meanwhile")
+            raise EditError(_CHANGED)
 
     def _save(self, text: str) -> None:
-        data = (self._mark + text).encode()
+        before, data = (self._mark + self.text).encode(), (self._mark + text).encode()
         if len(data) > SMALL.bytes:
             raise EditError(f"a specification has at most {SMALL.bytes} bytes")
+        self._recover()
         try:
-            # For a link, its target is replaced.
-            write_whole(os.path.realpath(self.path), data)
-            self._time = self.path.stat().st_mtime_ns
+            former = _Former(self.path.open("rb", buffering=0), before)
+            is_written = self._replaced(before, data)
         except OSError as error:
             raise EditError(f"cannot write {self.path}: {error.strerror}") from error
-        self.text = text
+        if not is_written:
+            former.file.close()
+            raise EditError(_CHANGED)
+        self._forget()
+        self.text, self._former = text, former
+
+    def _replaced(self, before: bytes, data: bytes) -> bool:
+        # For a link, its target is replaced.
+        return replace_content(os.path.realpath(self.path), before, data)
+
+    def _recover(self) -> None:
+        """Put back what an editor has saved to the replaced file, which it had opened before."""
+        if not self._former:
+            return
+        self._former.file.seek(0)
+        found = self._former.file.read(SMALL.bytes) or b""
+        # The file is empty while an editor saves it.
+        if found and found != self._former.content:
+            with suppress(OSError):
+                self._replaced((self._mark + self.text).encode(), found)
+            self._former = replace(self._former, content=found)
+        elif monotonic() > self._former.end:
+            self._forget()
+
+    def _forget(self) -> None:
+        if self._former:
+            self._former.file.close()
+            self._former = None

@@ -8,26 +8,84 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 TEMPORARY = ".new-"
 """The prefix of the names of incomplete files."""
+# Of Linux: relative paths begin in the current folder; the two files are exchanged.
+_HERE, _RENAME_EXCHANGE = -100, 2
+# The system, or the file system, cannot exchange two files.
+_NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL)
 
 
 def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a temporary file next to the target, then rename it. May raise `OSError`."""
+    """Write a temporary file next to the target, then rename it; an existing file keeps its mode and owner.
+
+    May raise `OSError`.
+    """
+    with _temporary(path, data) as temporary:
+        os.replace(temporary, path)
+
+
+def replace_content(path: str | os.PathLike[str], expected: bytes, data: bytes) -> bool:
+    """Write an existing file like `write_whole`, but only if its content is still `expected`; return whether it was.
+
+    A file that another program writes or replaces meanwhile is not lost, where the system can exchange two names. May
+    raise `OSError`.
+    """
+    with _temporary(path, data) as temporary:
+        own = os.stat(temporary).st_ino
+        try:
+            _exchange(temporary, path)
+        except OSError as error:
+            if error.errno not in _NO_EXCHANGE or read_file(path) != expected:
+                raise
+            os.replace(temporary, path)
+            return True
+        if read_file(temporary) == expected:
+            return True
+        _exchange(temporary, path)
+        while os.stat(temporary).st_ino != own:
+            # The file has been replaced again, so what was put back is older than what is now the temporary file.
+            _exchange(temporary, path)
+        return False
+
+
+@contextmanager
+def _temporary(path: str | os.PathLike[str], data: bytes) -> Iterator[str]:
+    """Provide a file with `data` next to `path`, with the mode and owner of an existing file there, and delete it."""
     folder = os.path.dirname(os.fspath(path))
     os.makedirs(folder or ".", exist_ok=True)
     # This name is unique across machines, unlike a process id.
     temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
+    former = None
+    with suppress(OSError):
+        former = os.stat(path)
+    mode = stat.S_IMODE(former.st_mode) if former else 0o666
     try:
-        with open(temporary, "xb") as file:
+        with open(temporary, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
+            if former:
+                with suppress(OSError):
+                    # Only root can give a file away; without the group, others keep at most what they had.
+                    os.chown(temporary, former.st_uid, former.st_gid)
+                os.chmod(temporary, mode)
             file.write(data)
-        os.replace(temporary, path)
-    except BaseException:
+        yield temporary
+    finally:
         with suppress(OSError):
             os.unlink(temporary)
-        raise
+
+
+def _exchange(one: str, other: str | os.PathLike[str]) -> None:
+    """Exchange two files in one step. May raise `OSError`."""
+    import ctypes
+
+    exchange = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if exchange is None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    if exchange(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _RENAME_EXCHANGE):
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), os.fspath(other))
 
 
 def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool:
