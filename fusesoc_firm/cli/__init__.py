@@ -17,6 +17,7 @@ from importlib import import_module
 
 from fusesoc_firm import __version__
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.terminal import safe_output
 from fusesoc_firm.tools.interrupts import accept_interrupts
 from fusesoc_firm.tools.verilator_package import provide_verilator
 
@@ -62,6 +63,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; return the exit status: 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
     accept_interrupts()
     provide_verilator(os.environ)
+    with safe_output():
+        return _run(argv)
+
+
+def _run(argv: Sequence[str] | None) -> int:
     try:
         arguments = _parsed(argv)
         arguments.handler(arguments)
