@@ -22,17 +22,19 @@ This module imports as little of Python's standard library as possible.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
-from errno import EFBIG
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from errno import EFBIG, EINVAL
 
 from fusesoc_firm.builds.store import shared_files
 from fusesoc_firm.tools.digests import digest, is_digest
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, BinaryIO
 
 LAYOUT = "v4"
 ENTRY, CALL, LOCK, REMARK = ".entry", ".call", ".lock", ".remark"
@@ -44,6 +46,8 @@ MOST_PLAIN_BYTES = 2**24
 MOST_BYTES = 2**30
 """The size limits for plain data and for all other files, since each file is read in one piece."""
 
+_DIGEST_BYTES = 64
+_PART_BYTES = 2**16
 # The limits that file systems impose.
 _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _FACT_PARTS, _FILE_PARTS = 3, 2
@@ -82,6 +86,44 @@ def read(root: str, name: str, most: int = 0) -> bytes | None:
         return None
     said, _, data = found.partition(b"\n")
     return data if digest(data).encode() == said else None
+
+
+@contextmanager
+def opened(root: str, name: str) -> Iterator[tuple[BinaryIO, int]]:
+    """Provide an undamaged file, at the beginning of its data, and the number of bytes of the data.
+
+    Raise `OSError` if the file is missing or damaged. The file is read in parts, unlike by `read`.
+    """
+    with shared_files.opened(root, name) as file:
+        said = file.read(_DIGEST_BYTES + 1)
+        found = hashlib.sha256()
+        while part := file.read(_PART_BYTES):
+            found.update(part)
+        size = file.tell() - len(said)
+        is_named = not name.endswith(CONTENT) or name == place(found.hexdigest(), CONTENT)
+        if said != f"{found.hexdigest()}\n".encode() or size > _most(name) or not is_named:
+            raise OSError(EINVAL, "the file is damaged")
+        file.seek(len(said))
+        yield file, size
+
+
+def receive(root: str, name: str, parts: Iterable[bytes]) -> None:
+    """Write data that come in parts with their digest to the store.
+
+    Raise `ValueError` if a content has another name, and `OSError`.
+    """
+    with shared_files.writing(root, name) as file:
+        file.write(b"0" * _DIGEST_BYTES + b"\n")
+        found = hashlib.sha256()
+        for part in parts:
+            found.update(part)
+            file.write(part)
+        if file.tell() > _most(name):
+            raise OSError(EFBIG, os.strerror(EFBIG))
+        if name.endswith(CONTENT) and name != place(found.hexdigest(), CONTENT):
+            raise ValueError("the content has another SHA-256")
+        file.seek(0)
+        file.write(found.hexdigest().encode())
 
 
 def read_content(root: str, name: str) -> bytes | None:

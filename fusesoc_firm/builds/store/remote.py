@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -26,12 +26,14 @@ from urllib.parse import urlsplit
 from fusesoc_firm.builds.store import layout, shared_files
 from fusesoc_firm.builds.store.layout import MOST_BYTES, REMARK, place
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.terminal import safe
 from fusesoc_firm.tools.digests import digest, digest_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from http.client import HTTPConnection
     from socket import socket
+    from threading import Timer
 
 URL, TOKEN, MODE, TIMEOUT = (f"FUSESOC_FIRM_REMOTE{name}" for name in ("", "_TOKEN", "_MODE", "_TIMEOUT"))
 """The environment variables of the remote store."""
@@ -40,6 +42,7 @@ _DEFAULT_TIMEOUT = "5"
 # Large transfers may take longer than the timeout, at this rate.
 _LEAST_BYTES_PER_SECOND = 2**20
 _MOST_RESULT_BYTES = 2**16
+_PART_BYTES = 2**16
 _SILENT_SECONDS = 60
 _READ, _WRITE, _DAMAGE = "read", "write", "damage"
 _OK, _NOT_FOUND, _REDIRECTED = 200, 404, 300
@@ -53,12 +56,47 @@ class _FailedError(Exception):
     """The server or the network failed."""
 
 
+class _Limit:
+    """The time that a transfer may take, after which `stop` is called in another thread."""
+
+    def __init__(self, seconds: float, stop: Callable[[], None]) -> None:
+        self.seconds = seconds
+        self._stop = stop
+        self._started = time.monotonic()
+        self._timer: Timer | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is over."""
+        return time.monotonic() >= self._started + self.seconds
+
+    def extend(self, size: int) -> None:
+        """Add the time for this number of bytes."""
+        self.seconds += size / _LEAST_BYTES_PER_SECOND
+
+    def start(self) -> None:
+        """Begin, or continue, to wait until the time is over."""
+        from threading import Timer
+
+        if self.is_over:
+            self._stop()
+            return
+        self._timer = Timer(self._started + self.seconds - time.monotonic(), self.start)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def cancel(self) -> None:
+        """Wait no longer. The timer that may have begun meanwhile shuts a closed connection."""
+        if self._timer:
+            self._timer.cancel()
+
+
 @dataclass(frozen=True)
 class Remote:
     """A remote store.
 
-    `timeout` is in seconds, and 1 s is added for each MiB of a transfer. `root` is the local store, which keeps the
-    times of failures.
+    `timeout` is in seconds, and 1 s is added for each MiB that is sent or has come. `root` is the local store, which
+    keeps the times of failures.
     """
 
     url: str
@@ -147,21 +185,25 @@ class Remote:
             layout.write(self.root, self._mark(kind), reason.encode(errors="replace"))
 
     def _warning(self, reason: str) -> str:
-        return f"warning: remote store {self.url}: {reason}"
+        return safe(f"warning: remote store {self.url}: {reason}")
 
     def _get(self, name: str, size: int) -> bytes | None:
         """Return the data under a name, which are at most one byte longer than `size`, or None if they are missing."""
-        with self._connected(size) as connection:
+        with self._connected(0) as (connection, limit):
             connection.request("GET", self._path(name), headers=self._headers())
             response = connection.getresponse()
             if response.status == _NOT_FOUND:
                 return None
             if response.status != _OK:
                 raise _FailedError(f"{response.status} {response.reason}")
-            data = response.read(size + 1)
+            data = bytearray()
+            # Only data that have come give time for more, since the server may claim any size.
+            while len(data) <= size and (part := response.read(min(size + 1 - len(data), _PART_BYTES))):
+                data += part
+                limit.extend(len(part))
             if response.length and len(data) <= size:
                 raise ConnectionError("the answer is cut")
-            return data
+            return bytes(data)
 
     def _is_put(self, name: str, data: bytes) -> bool:
         """Write data to the server, if this user may write; return whether that succeeded, and report a failure."""
@@ -175,7 +217,7 @@ class Remote:
         return True
 
     def _put(self, name: str, data: bytes) -> None:
-        with self._connected(len(data)) as connection:
+        with self._connected(len(data)) as (connection, _):
             # A server may refuse the request before it has read all data.
             with suppress(BrokenPipeError, ConnectionResetError):
                 connection.request("PUT", self._path(name), data, self._headers())
@@ -190,31 +232,28 @@ class Remote:
         return {"Authorization": f"Bearer {self.token}"} if self.token else {}
 
     @contextmanager
-    def _connected(self, size: int) -> Iterator[HTTPConnection]:
-        """Yield a connection that ends when the time for a transfer of `size` bytes is over."""
+    def _connected(self, size: int) -> Iterator[tuple[HTTPConnection, _Limit]]:
+        """Yield a connection, and the limit of its time: at first that for a transfer of `size` bytes."""
         from http.client import HTTPConnection, HTTPException, HTTPSConnection
-        from threading import Timer
 
         parts = urlsplit(self.url)
         kind = HTTPSConnection if parts.scheme == "https" else HTTPConnection
         connection = kind(parts.hostname or "", parts.port, timeout=self.timeout)
-        seconds = self.timeout + size / _LEAST_BYTES_PER_SECOND
         # The connection's own timeout starts again with every byte.
         held: list[socket] = []
-        timer = Timer(seconds, lambda: _shut(connection.sock, *held))
-        timer.daemon = True
-        started = time.monotonic()
-        timer.start()
+        limit = _Limit(self.timeout, lambda: _shut(connection.sock, *held))
+        limit.extend(size)
+        limit.start()
         try:
             connection.connect()
             # A connection forgets its socket when the answer begins.
             held.append(connection.sock)
-            yield connection
+            yield connection, limit
         except (OSError, HTTPException) as error:
-            is_late = isinstance(error, TimeoutError) or time.monotonic() - started >= seconds
-            raise _FailedError(f"no answer within {seconds:.3g} s" if is_late else _reason(error)) from None
+            is_late = isinstance(error, TimeoutError) or limit.is_over
+            raise _FailedError(f"no answer within {limit.seconds:.3g} s" if is_late else _reason(error)) from None
         finally:
-            timer.cancel()
+            limit.cancel()
             connection.close()
 
 

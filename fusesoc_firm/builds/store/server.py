@@ -9,17 +9,25 @@ from __future__ import annotations
 import hmac
 import re
 import socket
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from errno import ENOSPC
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from shutil import copyfileobj
+from typing import Any
 
 from fusesoc_firm.builds.store import layout
 from fusesoc_firm.builds.store.layout import ACTION, CONTENT, MOST_BYTES, MOST_PLAIN_BYTES, place
 from fusesoc_firm.builds.store.store import Store
-from fusesoc_firm.tools.digests import digest
 
 _PATH = re.compile(r"/(ac|cas)/([0-9a-f]{64})")
 _IDLE_SECONDS = 30
 _CHUNK_BYTES = 2**16
+# The limits of all connections together, whose data are passed on in chunks.
+_MOST_CONNECTIONS = 256
+_MOST_PENDING_BYTES = 4 * MOST_BYTES
 
 
 class Server(ThreadingHTTPServer):
@@ -32,6 +40,8 @@ class Server(ThreadingHTTPServer):
         """Listen on a port, or on any free port for 0. May raise `OSError`."""
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.store, self.token = store, token
+        self._places = threading.BoundedSemaphore(_MOST_CONNECTIONS)
+        self._pending, self._lock = 0, threading.Lock()
         super().__init__((host, port), _Handler)
 
     @property
@@ -40,6 +50,33 @@ class Server(ThreadingHTTPServer):
         host, port = self.server_address[:2]
         name = str(host)
         return f"http://{f'[{name}]' if ':' in name else name}:{port}"
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in a thread, or close it if there are too many."""
+        if self._places.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
+
+    @contextmanager
+    def room_for(self, size: int) -> Iterator[None]:
+        """Reserve room for data that are being received; raise `OSError` if all such data are too many."""
+        with self._lock:
+            if self._pending + size > _MOST_PENDING_BYTES:
+                raise OSError(ENOSPC, "too many data are being received")
+            self._pending += size
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._pending -= size
 
     def handle_error(self, *_: object) -> None:
         """Ignore a client that has closed its connection."""
@@ -53,12 +90,16 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         """Send the data under a name."""
         name = self._name()
-        data = (layout.read_content if name.endswith(CONTENT) else layout.read)(self._root, name) if name else None
-        if data is None:
-            self._answer(HTTPStatus.NOT_FOUND)
-            return
-        layout.mark_used(self._root, name)
-        self._answer(HTTPStatus.OK, data)
+        with ExitStack() as stack:
+            try:
+                file, size = stack.enter_context(layout.opened(self._root, name))
+            except OSError:
+                self._answer(HTTPStatus.NOT_FOUND)
+                return
+            layout.mark_used(self._root, name)
+            self._answer(HTTPStatus.OK, size)
+            if self.command != "HEAD":
+                copyfileobj(file, self.wfile, _CHUNK_BYTES)
 
     def do_HEAD(self) -> None:
         """Send the size of the data under a name."""
@@ -73,18 +114,21 @@ class _Handler(BaseHTTPRequestHandler):
             self._drain()
             return
         length = int(self.headers["Content-Length"])
-        data = self.rfile.read(length)
-        is_intact = len(data) == length and (name == place(digest(data), CONTENT) or name.endswith(ACTION))
-        if not is_intact:
-            self._answer(HTTPStatus.BAD_REQUEST)
-            return
         try:
-            layout.write(self._root, name, data)
+            with self.server.room_for(length):
+                layout.receive(self._root, name, self._parts(length))
             self.server.store.shrink_if_needed()
+        except (TimeoutError, ConnectionError):
+            raise
+        except ValueError:
+            self._answer(HTTPStatus.BAD_REQUEST)
         except OSError:
+            # The rest of the data would be read as the next request.
+            self.close_connection = True
             self._answer(HTTPStatus.INSUFFICIENT_STORAGE)
-            return
-        self._answer(HTTPStatus.CREATED)
+            self._drain()
+        else:
+            self._answer(HTTPStatus.CREATED)
 
     def log_message(self, *_: object) -> None:
         """Print nothing for each request."""
@@ -115,19 +159,26 @@ class _Handler(BaseHTTPRequestHandler):
             return HTTPStatus.REQUEST_ENTITY_TOO_LARGE
         return None
 
+    def _parts(self, length: int) -> Iterator[bytes]:
+        """Yield the data of a request in parts; raise `ValueError` if they are cut."""
+        while length:
+            part = self.rfile.read1(min(length, _CHUNK_BYTES))
+            if not part:
+                raise ValueError("the data are cut")
+            length -= len(part)
+            yield part
+
     def _drain(self) -> None:
         """Read the data of a refused write, since a client may read the answer only after it has sent them."""
         rest = MOST_PLAIN_BYTES
         while rest > 0 and (data := self.rfile.read1(min(rest, _CHUNK_BYTES))):
             rest -= len(data)
 
-    def _answer(self, status: HTTPStatus, data: bytes = b"") -> None:
+    def _answer(self, status: HTTPStatus, size: int = 0) -> None:
         self.send_response(status)
         if status == HTTPStatus.UNAUTHORIZED:
             self.send_header("WWW-Authenticate", "Bearer")
         if self.close_connection:
             self.send_header("Connection", "close")
-        self.send_header("Content-Length", str(len(data)))
+        self.send_header("Content-Length", str(size))
         self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(data)

@@ -20,6 +20,10 @@ from contextlib import contextmanager, suppress
 
 from fusesoc_firm.text.files import TEMPORARY
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import BinaryIO
+
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 # Opening a pipe must not wait for the other end, and a terminal must not become the controlling terminal.
 _FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
@@ -31,20 +35,26 @@ _TRIES = 100
 def read(root: str, name: str, most: int) -> bytes | None:
     """Return the content of a readable regular file of at most `most` bytes, or None for any other file."""
     try:
-        with _opened(root, os.path.dirname(name)) as folder:
-            handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
-        try:
-            status = os.fstat(handle)
-            if not stat.S_ISREG(status.st_mode) or status.st_size > most:
+        with opened(root, name) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > most:
                 return None
-            with open(handle, "rb", closefd=False) as file:
-                # Our files are complete when they appear, so a file that is still growing is not ours.
-                content = file.read(status.st_size + 1)
-            return content if len(content) == status.st_size else None
-        finally:
-            os.close(handle)
+            # Our files are complete when they appear, so a file that is still growing is not ours.
+            content = file.read(size + 1)
+            return content if len(content) == size else None
     except OSError:
         return None
+
+
+@contextmanager
+def opened(root: str, name: str) -> Iterator[BinaryIO]:
+    """Provide a regular file to be read. Raise `OSError` for any other path."""
+    with _opened(root, os.path.dirname(name)) as folder:
+        handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
+    with open(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "Not a regular file")
+        yield file
 
 
 def write_whole(root: str, name: str, data: bytes) -> None:
@@ -54,6 +64,27 @@ def write_whole(root: str, name: str, data: bytes) -> None:
         with suppress(FileNotFoundError):
             return _write(root, name, data)
     return _write(root, name, data)
+
+
+@contextmanager
+def writing(root: str, name: str) -> Iterator[BinaryIO]:
+    """Provide a temporary file next to the target, which it replaces at the end unless an error is raised.
+
+    Create missing folders. May raise `OSError`.
+    """
+    # This name is unique across machines, unlike a process id.
+    temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
+    with _opened(root, os.path.dirname(name), is_made=True) as folder:
+        try:
+            handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _FILE, _RIGHTS, dir_fd=folder)
+            with open(handle, "wb") as file:
+                _share(handle, folder)
+                yield file
+            os.replace(temporary, os.path.basename(name), src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(temporary, dir_fd=folder)
+            raise
 
 
 def open_lock(root: str, name: str) -> int:
@@ -102,19 +133,8 @@ def remove(root: str, name: str) -> int:
 
 
 def _write(root: str, name: str, data: bytes) -> None:
-    # This name is unique across machines, unlike a process id.
-    temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
-    with _opened(root, os.path.dirname(name), is_made=True) as folder:
-        try:
-            handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _FILE, _RIGHTS, dir_fd=folder)
-            with open(handle, "wb") as file:
-                _share(handle, folder)
-                file.write(data)
-            os.replace(temporary, os.path.basename(name), src_dir_fd=folder, dst_dir_fd=folder)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(temporary, dir_fd=folder)
-            raise
+    with writing(root, name) as file:
+        file.write(data)
 
 
 def _open_lock(root: str, name: str) -> int:

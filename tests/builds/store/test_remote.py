@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -20,8 +21,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.builds.store import layout
-from fusesoc_firm.builds.store.remote import MODE, TIMEOUT, TOKEN, URL, Remote, action_result, digest_in
+from fusesoc_firm.builds.store import layout, server
+from fusesoc_firm.builds.store.remote import MODE, TIMEOUT, TOKEN, URL, Remote, action_result, digest_in, remote_store
 from fusesoc_firm.builds.store.server import Server
 from fusesoc_firm.builds.store.store import Entry, Files, Key, Store, default_store
 from fusesoc_firm.text.diagnostics import InputError
@@ -175,7 +176,31 @@ def test_a_server_that_sends_byte_after_byte_is_not_waited_for(tmp_path: Path, c
     """The connection's own timeout starts again with every byte, so it never ends such an answer."""
     with served(Fake(lambda _: (200, bytes(10_000)), pause=0.05)) as url:
         assert obtain(machine(tmp_path, url, timeout=0.3)) == Entry(FILES, False)
-    assert capfd.readouterr().err.startswith(f"warning: remote store {url}: no answer within 0.36")
+    assert capfd.readouterr().err.startswith(f"warning: remote store {url}: no answer within 0.3 s")
+
+
+def test_a_claimed_size_sets_no_waiting_time(tmp_path: Path, capfd: Captured) -> None:
+    """A content of 512 MiB, of which a server sends a byte each 50 ms: without a bound, this lasts eight minutes."""
+    with served(Fake(lambda _: (200, bytes(10_000)), pause=0.05)) as url:
+        store = remote_store({URL: url, TIMEOUT: "0.3"}, str(tmp_path))
+        assert store and store.content("0" * 64, 2**29) is None
+    assert capfd.readouterr().err == f"warning: remote store {url}: no answer within 0.3 s\n"
+
+
+def test_codes_of_a_server_do_not_reach_the_terminal(tmp_path: Path, capfd: Captured) -> None:
+    with closing(silent_port()) as listening:
+
+        def answer() -> None:
+            connection, _ = listening.accept()
+            with connection:
+                connection.sendall(b"HTTP/1.1 500 \x1b]0;title\x07\x9b31m\r\nContent-Length: 0\r\n\r\n")
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        assert obtain(machine(tmp_path, url)) == Entry(FILES, False)
+        thread.join()
+    assert capfd.readouterr().err == f"warning: remote store {url}: 500 \\x1b]0;title\\x07\\x9b31m\n"
 
 
 @pytest.mark.parametrize(
@@ -359,7 +384,7 @@ def test_the_server_checks_what_it_gets(tmp_path: Path, url: str) -> None:
         assert request(url, "GET", path)[0] == 404
     assert request(url, "PUT", place, None, **known, Transfer_Encoding="chunked")[0] == 411
     assert request(url, "PUT", place, blob, **known, Content_Length=str(2**35))[0] == 413
-    assert not stored(tmp_path / "server", "*")
+    assert not [path for path in stored(tmp_path / "server", "*") if path.is_file()]
     assert request(url, "PUT", place, blob, **known)[0] == 201
     assert request(url, "GET", place) == (200, blob)
     assert request(url, "HEAD", place) == (200, b"")
@@ -370,6 +395,32 @@ def test_the_server_checks_what_it_gets(tmp_path: Path, url: str) -> None:
     assert request(url, "GET", f"/cas/{file.name[:2]}{'0' * 62}")[0] == 404
     assert len(Store(tmp_path / "server", 2**30).remove_damaged()) == 1
     assert Store(tmp_path / "server", 2**30).size() == file.stat().st_size
+
+
+def test_all_data_in_transit_are_bounded(tmp_path: Path, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    blob = b"anything"
+    place, known = f"/cas/{digest(blob)}", {"Authorization": f"Bearer {SECRET}"}
+    monkeypatch.setattr(server, "_MOST_PENDING_BYTES", len(blob) - 1)
+    assert request(url, "PUT", place, blob, **known)[0] == 507
+    monkeypatch.setattr(server, "_MOST_PENDING_BYTES", len(blob))
+    for _ in range(2):
+        assert request(url, "PUT", place, blob, **known)[0] == 201
+    assert request(url, "GET", place) == (200, blob)
+
+
+def test_the_server_passes_large_data_on_in_parts(tmp_path: Path, url: str) -> None:
+    """Its memory is a chunk for each connection."""
+    blob = bytes(32 * 2**20)
+    place, known = f"/cas/{digest(blob)}", {"Authorization": f"Bearer {SECRET}"}
+    tracemalloc.start()
+    try:
+        assert request(url, "PUT", place, blob, **known)[0] == 201
+        assert tracemalloc.get_traced_memory()[1] < len(blob)
+        tracemalloc.reset_peak()
+        assert request(url, "HEAD", place) == (200, b"")
+        assert tracemalloc.get_traced_memory()[1] < 4 * 2**20
+    finally:
+        tracemalloc.stop()
 
 
 def test_the_server_keeps_its_limit(tmp_path: Path) -> None:
