@@ -57,6 +57,7 @@ async def serve_foxglove(socket: web.WebSocketResponse, current: Callable[[], Ru
         async for message in socket:
             if message.type != WSMsgType.TEXT:
                 continue
+            # `int` raises the first two, for NaN and for infinity.
             with suppress(ValueError, OverflowError, RecursionError, TypeError, KeyError):
                 _take(client, json.loads(message.data))
     finally:

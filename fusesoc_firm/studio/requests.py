@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from aiohttp import web
+from aiohttp.http import HttpProcessingError
 
 from fusesoc_firm.text.json_text import json_text
 
@@ -22,7 +23,7 @@ async def body_of(request: web.Request) -> dict[str, Any]:
         # No file can contain a lone surrogate, which JSON's escapes can express.
         json.dumps(body, ensure_ascii=False).encode()
     # Python also refuses to read or print a number of thousands of digits.
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError, web.RequestPayloadError, HttpProcessingError):
         body = None
     if not isinstance(body, dict):
         raise web.HTTPBadRequest(reason="the request is not a mapping in JSON")

@@ -241,6 +241,12 @@ def test_a_request_of_another_form_is_refused(studio: Studio, body: bytes, kind:
     assert scene(studio)["text"] == TEXT
 
 
+@pytest.mark.parametrize("encoding", ["gzip", "deflate", "br", "zstd", "unknown"])
+def test_a_body_that_is_not_compressed_as_it_says_is_refused(studio: Studio, encoding: str) -> None:
+    assert ask(studio, "POST", "api/edit", b"not compressed", Content_Encoding=encoding)[0] == 400
+    assert scene(studio)["text"] == TEXT
+
+
 def test_nothing_of_a_file_runs_in_the_page(studio: Studio) -> None:
     """The browser is told to run our scripts alone."""
     _, answer, _ = ask(studio, "GET", "api/files")
