@@ -119,6 +119,8 @@ class Node:
         durability = Durability.TRANSIENT_LOCAL if endpoint.quality.is_transient_local else Durability.VOLATILE
         return rtps.parameter_list(
             parameter(Parameter.ENDPOINT_GUID, self.prefix + endpoint.entity),
+            # Without it, Fast DDS 3 does not name the owner of the endpoint.
+            parameter(Parameter.PARTICIPANT_GUID, self.prefix + rtps.PARTICIPANT),
             parameter(Parameter.TOPIC_NAME, rtps.string(endpoint.topic)),
             parameter(Parameter.TYPE_NAME, rtps.string(endpoint.type)),
             parameter(Parameter.RELIABILITY, struct.pack("<I", reliability) + _BLOCKING_TIME),

@@ -83,6 +83,14 @@ def test_an_endpoint_tells_its_quality() -> None:
     assert [facts.integers(Parameter.DURABILITY, "I") for facts in found] == [(1,), (0,), (1,)]
 
 
+def test_an_endpoint_names_its_owner() -> None:
+    """Fast DDS 3 shows other endpoints as those of an unknown program."""
+    made = node()
+    for item in made.endpoints:
+        facts = ParameterList.of(made.endpoint_data(item))
+        assert [*facts.all(Parameter.PARTICIPANT_GUID)] == [made.prefix + rtps.PARTICIPANT]
+
+
 @pytest.mark.parametrize(("distribution", "size"), [("jazzy", 16), ("humble", 24)])
 def test_the_graph_lists_readers_and_writers(distribution: str, size: int) -> None:
     """Written again by rosbags, from the distribution's own definition."""
