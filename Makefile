@@ -82,7 +82,7 @@ offer_hook = prefix=$$(git rev-parse --show-prefix 2>/dev/null) && [ -z "$$prefi
   [ "$$(git config core.hooksPath)" != .ci/hooks ] && \
   echo "To check the messages of your commits, enable the hook: git config core.hooksPath .ci/hooks" || true
 
-.PHONY: help sim test check ci docs studio ros bitstream bench matrix proofs dissertation policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
+.PHONY: help sim test check ci docs studio ros kilted bitstream bench matrix proofs dissertation policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -114,6 +114,9 @@ docs: tools $(VENV)/.extra-docs ## Run the commands in the documentation, build 
 studio: $(VENV)/.extra-page ## Build the page of firm studio
 	@cd fusesoc_firm/studio/page && export PATH="$(CURDIR)/$(BIN):$$PATH" && \
 	  npm ci --silent --no-audit --no-fund && npm run --silent build
+
+kilted: setup $(VENV)/.ros2_kilted ## Run the live tests of nodes, on hosts and in fabric, with ROS 2 Kilted
+	@FIRM_ROS2="$(VENV)/ros2_kilted" $(PYTEST) -m "not thorough" -k "not ros1" tests/ros tests/fabric
 
 # Some tests need both, and are skipped without them.
 ros: $(VENV)/.ros2
@@ -212,6 +215,10 @@ $(VENV)/.extra-%: $(VENV)/.installed
 $(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
 	@echo "Installing ROS 2 into $(VENV)/ros2"
 	@./.ci/install-ros2 $(VENV)/ros2 $< && touch $@ || echo "ROS 2 is missing: tests that need it are skipped" >&2
+
+$(VENV)/.ros2_kilted: tests/ros/ros2_kilted.txt $(VENV)/.installed
+	@echo "Installing ROS 2 Kilted into $(VENV)/ros2_kilted"
+	@./.ci/install-ros2 $(VENV)/ros2_kilted $< && touch $@
 
 clean: ## Remove everything that was built, except .venv
 	@find build -mindepth 1 -maxdepth 1 ! -name FUSESOC_IGNORE -exec rm -rf {} +

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from fusesoc_firm.cli.common import command
+from fusesoc_firm.node.engine.ros_wheels import DEFAULT, WHEELS
 
 
 def add_ros(commands: Any) -> None:
@@ -20,6 +21,12 @@ def add_ros(commands: Any) -> None:
         _install,
     )
     install.add_argument(
+        "--distribution",
+        choices=sorted(WHEELS),
+        default=DEFAULT,
+        help=f"the distribution; another one that is installed is replaced (default: {DEFAULT})",
+    )
+    install.add_argument(
         "packages",
         metavar="PACKAGE",
         nargs="*",
@@ -30,6 +37,6 @@ def add_ros(commands: Any) -> None:
 def _install(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.node.engine.ros_wheels import install_wheels, ros_python
 
-    for wheel in install_wheels(arguments.packages):
+    for wheel in install_wheels(arguments.packages, arguments.distribution):
         print(wheel)
     print(ros_python())

@@ -39,17 +39,32 @@ def test_the_wheels_and_those_of_message_packages_are_installed(
     python: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["ros", "install", "nav_msgs", "geometry_msgs"]) == 0
-    wheels = [*(f"{name}=={version}" for name, version in ros_wheels.WHEELS.items()), "ros-jazzy-nav-msgs"]
+    wheels = [*ros_wheels.requirements("jazzy"), "ros-jazzy-nav-msgs"]
     assert capsys.readouterr().out.splitlines() == [*wheels, str(python)]
     log = (python.parent / "python.log").read_text(encoding="utf-8")
     assert log == f"-m pip install --quiet --disable-pip-version-check {' '.join(wheels)}\n"
 
 
-def test_the_wheels_are_those_of_the_tests() -> None:
-    text = (ROOT / "tests" / "ros" / "ros2.txt").read_text(encoding="utf-8")
-    wheels = [f"{name}=={version}" for name, version in ros_wheels.WHEELS.items()]
+@pytest.mark.parametrize(
+    ("distribution", "file", "further"),
+    [("jazzy", "ros2.txt", "2.0.3"), ("kilted", "ros2_kilted.txt", "2.3.0")],
+)
+def test_the_wheels_are_those_of_the_tests(distribution: str, file: str, further: str) -> None:
+    text = (ROOT / "tests" / "ros" / file).read_text(encoding="utf-8")
     # Only the tests need the last one.
-    assert [*wheels, "ros-jazzy-test-msgs==2.0.3"] == text.splitlines()[1:]
+    wheels = [*ros_wheels.requirements(distribution), f"ros-{distribution}-test-msgs=={further}"]
+    assert wheels == text.splitlines()[1:]
+
+
+def test_another_distribution_replaces_the_installed_one(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[bool] = []
+    monkeypatch.setattr(ros_wheels.venv, "create", lambda *_, clear, **__: made.append(clear))
+    installed = python.parents[1] / "lib/python3.11/site-packages/ros_jazzy_rclpy-7.1.6.dist-info"
+    installed.mkdir(parents=True)
+    ros_wheels.install_wheels([], "jazzy")
+    assert made == []
+    assert ros_wheels.install_wheels(["nav_msgs"], "kilted")[-1] == "ros-kilted-nav-msgs"
+    assert made == [True]
 
 
 def test_a_failure_of_pip_is_reported(python: Path) -> None:

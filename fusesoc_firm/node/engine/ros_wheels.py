@@ -13,12 +13,22 @@ from fusesoc_firm.text.diagnostics import fail
 
 # rclpy, the middleware that carries its messages, and the messages that most systems use; std_msgs follows from them.
 WHEELS = {
-    "ros-jazzy-rclpy": "7.1.6",
-    "ros-jazzy-rmw-fastrtps-cpp": "8.4.3",
-    "ros-jazzy-diagnostic-msgs": "5.3.6",
-    "ros-jazzy-geometry-msgs": "5.3.6",
-    "ros-jazzy-sensor-msgs": "5.3.6",
+    "jazzy": {
+        "rclpy": "7.1.6",
+        "rmw-fastrtps-cpp": "8.4.3",
+        "diagnostic-msgs": "5.3.6",
+        "geometry-msgs": "5.3.6",
+        "sensor-msgs": "5.3.6",
+    },
+    "kilted": {
+        "rclpy": "9.1.2",
+        "rmw-fastrtps-cpp": "9.3.3",
+        "diagnostic-msgs": "5.5.1",
+        "geometry-msgs": "5.5.1",
+        "sensor-msgs": "5.5.1",
+    },
 }
+DEFAULT = "jazzy"
 
 
 def ros_folder() -> Path:
@@ -31,18 +41,21 @@ def ros_python() -> Path:
     return ros_folder() / "bin" / "python"
 
 
-def install_wheels(packages: Sequence[str]) -> list[str]:
+def install_wheels(packages: Sequence[str], distribution: str = DEFAULT) -> list[str]:
     """Install the wheels, and those of the message packages `packages` such as `nav_msgs`; return their requirements.
 
-    An existing environment is kept and extended. Raise `InputError` if pip fails or a library of Python is missing.
+    An existing environment is kept and extended, unless it has another distribution. Raise `InputError` if pip fails or
+    a library of Python is missing.
     """
     library = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     if not find_library(library):
         fail(f"ROS 2 needs the library lib{library}", hint=f"apt-get install lib{library}")
-    wheels = [f"{name}=={version}" for name, version in WHEELS.items()]
-    wheels += [name for name in map(_wheel, packages) if name not in WHEELS]
-    if not ros_python().exists():
-        venv.create(ros_folder(), with_pip=True)
+    wheels = requirements(distribution)
+    further = [package.replace("_", "-") for package in packages]
+    wheels += [_wheel(distribution, name) for name in further if name not in WHEELS[distribution]]
+    is_other = any(_has(other) for other in WHEELS if other != distribution)
+    if is_other or not ros_python().exists():
+        venv.create(ros_folder(), with_pip=True, clear=is_other)
     command = [str(ros_python()), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wheels]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -51,5 +64,15 @@ def install_wheels(packages: Sequence[str]) -> list[str]:
     return wheels
 
 
-def _wheel(package: str) -> str:
-    return f"ros-jazzy-{package.replace('_', '-')}"
+def requirements(distribution: str) -> list[str]:
+    """Return the requirements that are always installed."""
+    return [f"{_wheel(distribution, name)}=={version}" for name, version in WHEELS[distribution].items()]
+
+
+def _wheel(distribution: str, name: str) -> str:
+    return f"ros-{distribution}-{name}"
+
+
+def _has(distribution: str) -> bool:
+    """Return whether the environment has wheels of a distribution."""
+    return any(ros_folder().glob(f"lib/python*/site-packages/ros_{distribution}_rclpy-*.dist-info"))
