@@ -60,6 +60,19 @@ def test_a_message_of_a_store_points_into_its_text() -> None:
     assert source.text == "float64 y"
 
 
+def test_lyrical_has_other_messages() -> None:
+    """Of the messages before it, some are gone, and an event of lifecycle nodes has another field and hash."""
+    jazzy, lyrical = (MessageLibrary(ROS2, store=name) for name in ("jazzy", "lyrical"))
+    gone = {str(name) for name in jazzy.names()} - {str(name) for name in lyrical.names()}
+    assert {"geometry_msgs/Pose2D", "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatus"} <= gone
+    with pytest.raises(InputError, match="unknown message 'geometry_msgs/Pose2D'"):
+        lyrical.get(MessageName("geometry_msgs", "Pose2D"))
+    event = MessageName("lifecycle_msgs", "TransitionEvent")
+    assert [field_names(library, event)[0] for library in (jazzy, lyrical)] == ["timestamp", "stamp"]
+    hashes = {signature(event, library.closure(event)) for library in (jazzy, lyrical)}
+    assert len(hashes) == 2
+
+
 def test_distributions() -> None:
     assert distributions(1) == ["noetic"]
     assert {"foxy", "humble", "jazzy"} <= set(distributions(2))
