@@ -63,9 +63,9 @@ def _numbers(terms: Sequence[Term]) -> Iterator[int]:
             case Align(alignment):
                 yield -alignment
             case Repeat(part, body, stride):
-                count, terminator = (None, part.terminator) if isinstance(part, Data) else (part.count, 0)
+                fixed, terminator = (None, part.terminator) if isinstance(part, Data) else (part.count, 0)
                 inner = tuple(_numbers(body))
-                yield from (REPEAT, COUNTED if count is None else count, terminator)
+                yield from (REPEAT, COUNTED if fixed is None else fixed, terminator)
                 yield from (VARYING if stride is None else stride, len(inner), *inner)
 
 

@@ -332,6 +332,7 @@ struct System {
   std::vector<Topic> subscribers, publishers;
   Topic diagnostics;
   std::vector<std::string> channels{};
+  std::vector<std::vector<long>> contents{};
   Software software{};
 };
 template <class T>

@@ -58,7 +58,7 @@ def test_the_wheels_are_those_of_the_tests(distribution: str, file: str, further
 
 def test_another_distribution_replaces_the_installed_one(python: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[bool] = []
-    monkeypatch.setattr(ros_wheels.venv, "create", lambda *_, clear, **__: made.append(clear))
+    monkeypatch.setattr("venv.create", lambda *_, clear, **__: made.append(clear))
     installed = python.parents[1] / "lib/python3.11/site-packages/ros_jazzy_rclpy-7.1.6.dist-info"
     installed.mkdir(parents=True)
     ros_wheels.install_wheels([], "jazzy")
