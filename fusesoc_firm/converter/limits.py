@@ -1,4 +1,4 @@
-"""The limits of converters for messages of fixed size."""
+"""The limits of converters."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from fusesoc_firm.frame.model import Data, Frame, Loop, Node
 from fusesoc_firm.text.diagnostics import Diagnostics
+
+# A forwarded length may count this number of bytes after a message of variable size, which become zeros.
+LONGEST_TAIL = 255
 
 
 def check_fixed_size(frame: Frame) -> None:

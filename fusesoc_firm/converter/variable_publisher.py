@@ -13,6 +13,7 @@ from functools import cached_property
 from itertools import groupby
 from textwrap import shorten
 
+from fusesoc_firm.converter.limits import LONGEST_TAIL
 from fusesoc_firm.converter.message_ports import (
     MessageSide,
     StreamPorts,
@@ -97,7 +98,7 @@ class _Publisher:
             "is_wide": self.width > _COUNTER_BITS,
             "ports": port_declarations(message_ports(self.frame, self.width), "in"),
             "segments": self.side.segments,
-            "slack": self.frame.trailing_bytes,
+            "slack": LONGEST_TAIL if self.frame.trailing_bytes else 0,
             "areas": _listed(self.places),
             "end": end,
             "place_bits": end.bit_length(),

@@ -125,7 +125,8 @@ class _Subscriber:
             "is_aligned_lossy": is_lossy(2 * len(self.steps)),
             "is_choice_lossy": is_lossy(4 * len(self.steps)),
             "step_bits": (len(self.steps) - 1).bit_length(),
-            "trailing_bits": self.frame.trailing_bytes.bit_length(),
+            # Bytes after the message are dropped, however many there are.
+            "has_tail": self.frame.trailing_bytes > 0,
             "first_gap": len(self.frame.prefix) % _LARGEST_ALIGNMENT,
             **self._tables(),
             **self._kinds(),

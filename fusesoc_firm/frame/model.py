@@ -190,7 +190,8 @@ class Frame:
     """The layout of a message.
 
     `prefix` is the constant bytes before the first field; a receiver checks only the first `checked_prefix` bytes. The
-    hardware accepts up to `trailing_bytes` bytes after the last field; unless this is 0, the host accepts any number.
+    converters of messages of fixed size accept up to `trailing_bytes` bytes after the last field. Unless this is 0, all
+    others accept any number.
     """
 
     message: MessageName

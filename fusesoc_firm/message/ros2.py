@@ -1,8 +1,9 @@
 """ROS 2: the serialisation is little-endian XCDR version 1, as defined in DDS-XTYPES 1.3, section 7.4.
 
 The first two bytes of the header name the encoding and are checked; the other two are options, which receivers ignore.
-Writers pad a payload to a multiple of four bytes, so up to three trailing bytes may follow. There is no padding between
-the count of an empty sequence and the following value.
+Writers pad a payload to a multiple of four bytes, so up to three trailing bytes may follow; after a message of variable
+size, rclpy's `serialize_message` leaves more. There is no padding between the count of an empty sequence and the
+following value.
 """
 
 from functools import partial

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity
+from fusesoc_firm.converter.limits import LONGEST_TAIL
 from fusesoc_firm.converter.message_ports import StreamPorts, message_ports, message_side
 from fusesoc_firm.converter.program import Block, Count, Header, Scope, publisher_program
 from fusesoc_firm.converter.variable_publisher import (
@@ -280,7 +281,8 @@ class Publisher:
         """The same with another `payload_length`."""
         payload = message.payload[:length] + bytes(max(0, length - len(message.payload)))
         slack = length - len(message.payload)
-        error = 0 if 0 <= slack <= self.frame.trailing_bytes else BAD_LENGTH
+        most = LONGEST_TAIL if self.frame.trailing_bytes else 0
+        error = 0 if 0 <= slack <= most else BAD_LENGTH
         return replace(message, bits=message.bits[:-32] + f"{length:032b}", payload=payload, error=error)
 
     def with_length(self, message: Message, name: str, length: int) -> Message:
