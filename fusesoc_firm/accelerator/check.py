@@ -23,6 +23,8 @@ from fusesoc_firm.tools.programs import find, ways
 from fusesoc_firm.tools.yosys import Yosys
 
 _PROGRAMS = {"VHDL": "ghdl", "Verilog": "yosys"}
+# The names of VHDL's standards in GHDL.
+_STANDARDS = {93: "93", 2008: "08"}
 
 
 def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries]) -> tuple[Diagnostic, ...]:
@@ -72,7 +74,9 @@ def _reader(
 
     sources = list(dict.fromkeys(path for type_ in types for path in _sources(type_, loaded.folder)))
     if types[0].accelerator.type == "VHDL":
-        return VhdlReader(program, folder, complete, sources).read
+        # GHDL has one standard for all files of a design.
+        standard = _STANDARDS[max(type_.accelerator.vhdl_standard for type_ in types)]
+        return VhdlReader(program, folder, complete, sources, standard).read
     ghdl = find("ghdl")
     entity = VhdlReader(ghdl, folder, complete, []).entity if ghdl else lambda *_: None
     return VerilogReader(Yosys(program, folder), Instances(complete, entity)).read

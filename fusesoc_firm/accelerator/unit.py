@@ -39,15 +39,18 @@ class Unit:
 class Libraries:
     """The VHDL files of other cores that the accelerators may use, each with its library, and GHDL's options.
 
-    `packages` are the texts of generated packages, and `generated` the names of all generated units. With
-    `is_complete`, a unit that is neither in one of the files nor generated is a fault.
+    An empty `standard` leaves the choice to the accelerators. `packages` are the texts of generated packages, and
+    `generated` the names of all generated units. With `is_complete`, a unit that is neither in one of the files nor
+    generated is a fault. `core_with` returns the name of a core with a unit in a library, or an empty text.
     """
 
     files: Sequence[tuple[Path, str]] = ()
-    options: Sequence[str] = ("--std=93",)
+    standard: str = ""
+    options: Sequence[str] = ()
     is_complete: bool = False
     packages: Sequence[str] = ()
     generated: Container[str] = frozenset()
+    core_with: Callable[[str, str], str] = lambda _library, _unit: ""
 
 
 # Returns the units of the files, and adds the faults in the files to the collector.

@@ -12,23 +12,23 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
-from fusesoc_firm.accelerator.instances import core_with
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
 from fusesoc_firm.netlist import dump
 from fusesoc_firm.netlist.corrections import lost_latches
 from fusesoc_firm.netlist.instantiated import entities
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.outputs import shown
 
 # A process that never waits is only a warning, but its simulation would never end.
 _MESSAGE = re.compile(
-    r".+?:(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?:warning: (?=infinite loop))?(?!warning|note)(?P<text>.+)"
+    r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?:warning: (?=infinite loop))?"
+    r"(?!warning|note)(?P<text>.+)"
 )
 _OPTION = re.compile(r" \[-W[\w-]+\]$")
 # Of GHDL's synthesis; the place is the signal's declaration.
@@ -41,7 +41,10 @@ _LENGTH = re.compile(
 _LATCH = re.compile(r"^.*latch infered for net .*(?= \(use --latches\))", re.MULTILINE)
 _PLACED = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?: ?error:)? ?(?P<text>.+)")
 _INSTANCE = re.compile(r"(\w+)\s*:\s*(?:entity\s+)?(?:\w+\s*\.\s*)?(\w+)\s+(?:generic|port)\s+map", re.IGNORECASE)
-_MISSING_UNIT = re.compile(r'unit "(\w+)" not found in library|cannot find resource library')
+_MISSING_UNIT = re.compile(
+    r"unit [\"'](?P<unit>\w+)[\"'] not found in library [\"'](?P<of>\w+)|"
+    r"cannot find resource library [\"'](?P<library>\w+)"
+)
 _ARCHITECTURE = re.compile(
     r"^[ \t]*architecture\s+\w+\s+of\s+\w+\s+is\b.*?"
     r"(?=^[ \t]*(?:architecture\s+\w+\s+of|library\s|entity\s+\w+\s+is|package\s|configuration\s+\w+\s+of)|\Z)",
@@ -62,7 +65,7 @@ _BIT_TYPES = ("std_logic", "std_ulogic")
 
 @dataclass
 class VhdlReader:
-    """GHDL with a library in `folder`.
+    """GHDL with a library in `folder`, for a VHDL `standard` in GHDL's spelling.
 
     `libraries` returns the files that accelerators may use; it is called only if an accelerator cannot be analysed
     without them. All accelerators in `sources` are read together first, which is enough if they have no faults.
@@ -72,20 +75,28 @@ class VhdlReader:
     folder: Path
     libraries: Callable[[], Libraries]
     sources: Sequence[Path]
+    standard: str = "93"
     _known: Libraries = field(default_factory=Libraries)
     _is_prepared: bool = False
 
     def read(self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics) -> list[Unit]:
-        """Return the entities of the files with the values of generics; add the faults of the first faulty file."""
+        """Return the entities of the files with the values of generics; add the faults of the first faulty file.
+
+        A fault in a file of another core is reported instead of the faults in the accelerator, which may result from
+        it.
+        """
         messages = [] if self._is_faultless else self._analysed(paths)
         if messages and not self._is_prepared:
             self._prepare()
+        if messages and self._known.files:
+            messages = self._made(paths, top) or self._analysed(paths)
+        elif messages:
             messages = self._analysed(paths)
-        absent = [match[1] for text, _ in messages if (match := _MISSING_UNIT.match(text))]
+        absent = [match for text, _ in messages if (match := _MISSING_UNIT.match(text))]
         # The declarations in a missing unit are unknown, so further messages are irrelevant.
-        if not absent or (self._known.is_complete and not any(name in self._known.generated for name in absent)):
-            for text, source in messages:
-                faults.error(text, source, _hint(text))
+        is_known = self._known.is_complete and not any(match["unit"] in self._known.generated for match in absent)
+        for text, source in messages if is_known or not absent else ():
+            faults.error(text, source, self._hint(text))
         if not messages:
             self._report_sources(paths, top, generics, faults)
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
@@ -106,19 +117,39 @@ class VhdlReader:
         return self._tree(self.sources)
 
     def _prepare(self) -> None:
-        """Analyse the files that accelerators may use; their faults are not the accelerators'."""
+        """Let GHDL know the files that accelerators may use."""
         self._is_prepared = True
         self._known = self.libraries()
         self._run("-a", self._packages())
-        for library, files in groupby(self._known.files, key=lambda item: item[1]):
-            self._run("-a", [path for path, _ in files], library)
+        for library in dict.fromkeys(library for _, library in self._known.files):
+            self._run("-i", [path for path, of in self._known.files if of == library], library)
+
+    def _made(self, paths: Sequence[Path], top: str) -> list[tuple[str, SourceRef]]:
+        """Analyse an accelerator and the files of other cores that it uses, in GHDL's own order, as a build does.
+
+        Return the messages about files of other cores or, without these, about the accelerator.
+        """
+        self._run("-i", paths)
+        found = list(_messages(self._run("-m", [top]).stderr))
+        own = set(map(str, paths))
+        return [item.placed() for item in [item for item in found if item.file not in own] or found]
 
     def _analysed(self, paths: Sequence[Path]) -> list[tuple[str, SourceRef]]:
         """Return GHDL's messages about the first file with faults."""
         for path in paths:
             if messages := list(_messages(self._run("-a", [path]).stderr)):
-                return [(text, place(path, line, column)) for text, line, column in messages]
+                return [item.placed() for item in messages]
         return []
+
+    def _hint(self, text: str) -> str:
+        """Return a hint about a fault, such as the core with a missing library or unit, or an empty text."""
+        if text.startswith("infinite loop"):
+            return "list the signals that start the process: 'process (clk)'"
+        if text.startswith('no declaration for "firm"'):
+            return "write 'library firm;' at the top of the file"
+        found = _MISSING_UNIT.match(text)
+        name = self._known.core_with(found["library"] or found["of"], found["unit"] or "") if found else ""
+        return f"it is in {name}, on which the accelerator's core must depend" if name else ""
 
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
@@ -204,21 +235,37 @@ class VhdlReader:
     def _started(
         self, command: str, places: Sequence[str], others: Sequence[Path | str]
     ) -> subprocess.CompletedProcess[str]:
-        arguments: list[str | Path] = [self.ghdl, command, *self._known.options, *places, *others]
+        standard = f"--std={self._known.standard or self.standard}"
+        arguments: list[str | Path] = [self.ghdl, command, standard, *self._known.options, *places, *others]
         return subprocess.run(
             arguments, capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL, check=False
         )
 
 
-def _messages(output: str) -> Iterator[tuple[str, int, int]]:
-    """Yield GHDL's errors in a file with line and column; a line in parentheses continues the message before it."""
-    found: list[tuple[str, int, int]] = []
+@dataclass(frozen=True)
+class _Message:
+    """A message of GHDL, with the file as named on the command line."""
+
+    text: str
+    file: str
+    line: int
+    column: int
+
+    def placed(self) -> tuple[str, SourceRef]:
+        """Return the text and its place."""
+        return self.text, place(Path(shown(Path(self.file))), self.line, self.column)
+
+
+def _messages(output: str) -> Iterator[_Message]:
+    """Yield GHDL's errors in files; a line in parentheses continues the message before it."""
+    found: list[_Message] = []
     for match in filter(None, map(_MESSAGE.match, output.splitlines())):
         if match["text"].startswith("(") and found:
-            found[-1] = (f"{found[-1][0]} {match['text']}", *found[-1][1:])
+            found[-1] = replace(found[-1], text=f"{found[-1].text} {match['text']}")
         else:
-            found.append((_OPTION.sub("", match["text"]), int(match["line"]), int(match["column"])))
-    yield from found
+            text = _OPTION.sub("", match["text"])
+            found.append(_Message(text, match["file"], int(match["line"]), int(match["column"])))
+    yield from dict.fromkeys(found)
 
 
 def _declarations(text: str) -> str:
@@ -272,7 +319,12 @@ class _Tree:
 
     def _type_name(self, type_: Element | None) -> str:
         """Return the name of the type of an array, or the declared name of another type."""
-        while type_ is not None and type_.get("kind", "").startswith("array_subtype"):
+        # In VHDL-2008, std_logic_vector is itself a subtype: std_ulogic_vector with resolved elements.
+        while (
+            type_ is not None
+            and type_.get("kind", "").startswith("array_subtype")
+            and type_.find("resolution_indication") is None
+        ):
             type_ = self._follow(type_.find("parent_type"))
         declaration = self._follow(type_.find("type_declarator")) if type_ is not None else None
         return declaration.get("identifier", "") if declaration is not None else ""
@@ -321,16 +373,3 @@ class _Tree:
     def _place(self, item: Element, path: Path) -> SourceRef:
         name = item.get("identifier", "")
         return place(path, int(item.get("line", "1")), int(item.get("col", "1")), len(name), self._lines[path])
-
-
-def _hint(text: str) -> str:
-    """Return a hint about a fault, such as the missing library or unit, or an empty text."""
-    if text.startswith("infinite loop"):
-        return "list the signals that start the process: 'process (clk)'"
-    if text.startswith('no declaration for "firm"'):
-        return "write 'library firm;' at the top of the file"
-    found = _MISSING_UNIT.match(text)
-    if not found or not found[1]:
-        return ""
-    name = core_with(found[1])
-    return f"it is in {name}, on which the accelerator's core must depend" if name else ""

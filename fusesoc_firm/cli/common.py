@@ -126,8 +126,10 @@ def check_sources(loaded: LoadedSystem, spec: Path) -> tuple[Diagnostic, ...]:
 
     def libraries() -> Libraries:
         core = core_of(spec)
-        found = vhdl_sources(str(core.data.get("name", "")), core.path.parent) if core else None
-        return Libraries(found.files, found.options, found.is_complete) if found else Libraries()
+        if core is None:
+            return Libraries()
+        found = vhdl_sources(str(core.data.get("name", "")), core.path.parent)
+        return Libraries(found.files, found.standard, found.options, found.is_complete, core_with=found.core_with)
 
     return check_accelerators(loaded, libraries)
 

@@ -74,10 +74,8 @@ from fusesoc_firm.text.render import render
 from fusesoc_firm.text.yaml_text import Text
 from fusesoc_firm.tools.reads import Input
 
-# FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
+# FuseSoC's file types of Verilog by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
-    ".vhd": VHDL,
-    ".vhdl": VHDL,
     ".v": "verilogSource-2005",
     ".vh": "verilogSource-2005",
     ".sv": "systemVerilogSource",
@@ -361,10 +359,14 @@ def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, Genera
             if path not in taken:
                 suffix = path.suffix.lower()
                 files[source_name(accelerator, source)] = GeneratedFile(
-                    path.read_bytes(), _FILE_TYPES[suffix], is_include_file=suffix in _INCLUDE_SUFFIXES
+                    path.read_bytes(), _file_type(accelerator, suffix), is_include_file=suffix in _INCLUDE_SUFFIXES
                 )
                 taken.add(path)
     return files
+
+
+def _file_type(accelerator: Accelerator, suffix: str) -> str:
+    return f"vhdlSource-{accelerator.vhdl_standard}" if accelerator.type == "VHDL" else _FILE_TYPES[suffix]
 
 
 def source_name(accelerator: Accelerator, source: str) -> str:

@@ -12,7 +12,7 @@ from fusesoc_firm.accelerator.unit import Libraries
 from fusesoc_firm.cli import main
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError
-from tests.hdl.ghdl import CORES, core_files
+from tests.hdl.ghdl import core_files
 
 _GENERIC = "generic (WIDTH : positive; LEVEL : natural);\n  port ("
 _LATCH = "  p : process (clk)\n  begin\n    if clk = '1' then\n      {}\n    end if;\n  end process;\n"
@@ -254,14 +254,6 @@ def test_many_superfluous_ports_are_one_fault() -> None:
     (fault,) = diagnostics("vhdl", "    rst_n : in", f"{ports}    rst_n : in")
     assert fault.message.endswith("'extra_3' and 5 more are not in the interface")
     assert "firm system skeleton" in fault.hint
-
-
-def test_the_core_of_a_missing_unit_is_named() -> None:
-    use = "library firm;\nuse firm.firm_float_pkg.all;\n"
-    old = "architecture rtl of img is"
-    others = Libraries([(CORES / "axis/rtl/firm_axis_pkg.vhd", "firm")], is_complete=True)
-    (fault, *_) = diagnostics("vhdl", old, use + old, others)
-    assert fault.hint == "it is in robot:acc:firm_float, on which the accelerator's core must depend"
 
 
 _PARAMETERS = "#(.EXPONENT_BITS(8), .MANTISSA_BITS(23))"

@@ -186,6 +186,9 @@ class _Resolver:
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"
                 self.faults.error(f"'{source}' is not a source file for type {accelerator.type}", source.source, hint)
+        if accelerator.standard is not None and accelerator.type and accelerator.type != "VHDL":
+            message = f"'standard' is legal only for VHDL, but '{accelerator.name}' has the type {accelerator.type}"
+            self.faults.error(message, accelerator.place("standard"), "remove the key")
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""

@@ -71,6 +71,7 @@ PROFILES = {
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+VHDL_93, VHDL_2008 = VHDL_STANDARDS = (93, 2008)
 # Whether the top level has a synchroniser after an input pin, a FIFO after a publisher, or time stamps.
 ADDED, NOT_ADDED = ADDITIONS = ("added", "none")
 # `vendor:library:name`, with an optional version.
@@ -303,6 +304,9 @@ class Accelerator(Section):
         unless=("type", SOFTWARE),
         rule=source_fault,
     )
+    standard: int | None = key(
+        "the VHDL standard of the sources (default: 93)", form="integer", choices=VHDL_STANDARDS, is_asked=False
+    )
     interface: Interface = key("the accelerator's messages", form="section", section=Interface, is_required=True)
     width: int | None = key(
         "width in bits of the accelerator's streams (default: the project's width)", form="integer", choices=WIDTHS
@@ -313,6 +317,11 @@ class Accelerator(Section):
     def is_software(self) -> bool:
         """Whether the accelerator runs on the host."""
         return self.type == SOFTWARE
+
+    @property
+    def vhdl_standard(self) -> int:
+        """The VHDL standard of the sources."""
+        return self.standard or VHDL_93
 
 
 @dataclass(frozen=True)
