@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from fusesoc_firm.builds.setup.outcome import Build, Limits, Outcome, ignore
 from fusesoc_firm.builds.setup.process import Run, run_all, save_time
 from fusesoc_firm.builds.setup.recall import Recall, note_call, observed, unobserved
-from fusesoc_firm.builds.setup.steps import Steps, run_unstored
+from fusesoc_firm.builds.setup.steps import Steps, report_of, run_unstored
+from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools import own_code
 from fusesoc_firm.tools.launcher import launcher_of_steps
 from fusesoc_firm.tools.library_path import library_root
@@ -81,6 +82,9 @@ def build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, 
 
 def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None, None]:
     _set_launcher(how)
+    plan, faults = plan.sound()
+    for item, error in faults.items():
+        yield _refused(item, error)
     if how.is_locked:
         from fusesoc_firm.builds.project import check_locked
 
@@ -96,6 +100,14 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
     judged = partial(run_unstored, flags=plan.options.use_flags())
     run = how.steps or (run_all if how.is_setup_only or how.is_build_only else judged)
     yield from _pool(plan, how, listener, words, run).run(plan)
+
+
+def _refused(build: Build, error: InputError) -> Outcome:
+    """Return the outcome of a build that cannot be set up; its log contains the faults."""
+    report_of(build).unlink(missing_ok=True)
+    build.log.parent.mkdir(parents=True, exist_ok=True)
+    build.log.write_text(f"{error}\n", encoding="utf-8")
+    return Outcome(build, False, 0, tuple(str(error).splitlines()))
 
 
 def _build_on_cluster(plan: Plan, how: How, listener: Listener, options: list[str]) -> Generator[Outcome, None, None]:
@@ -162,6 +174,8 @@ def recall_or_build(
             return
     with observed() as found:
         plan = make()
+    # A recalled plan would not repeat FuseSoC's warnings.
+    found.is_whole = found.is_whole and not plan.fusesoc.parse_errors
     steps = replace(how.steps, recall=recall, scan=recall.keep_builds(plan.builds, found))
     if not known:
         listener.plan(plan.builds)

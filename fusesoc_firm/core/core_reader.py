@@ -58,6 +58,21 @@ class CoreFile:
         """Return the place of a node."""
         return self.text.source(node)
 
+    def place_of(self, word: str) -> SourceRef:
+        """Return the place of the first text that contains a word, or of the whole content."""
+        waiting, seen = [self.text.root], set()
+        while waiting:
+            node = waiting.pop(0)
+            if isinstance(node, yaml.ScalarNode) and word in node.value:
+                return self.source(node)
+            # An alias may refer to a node that contains it.
+            if id(node) not in seen and isinstance(node, yaml.CollectionNode):
+                seen.add(id(node))
+                items = node.value
+                inner = [part for pair in items for part in pair] if isinstance(node, yaml.MappingNode) else items
+                waiting[:0] = inner
+        return self.source(self.text.root)
+
 
 def read_core(path: Path) -> CoreFile:
     """Read a `.core` file. Raise `InputError`, at the place of the fault, if it is unreadable or not YAML."""

@@ -12,10 +12,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.builds.setup.libraries import core_fault, ignored, open_libraries, unsolved
 from fusesoc_firm.core.core_reader import CoreFile, read_core
 from fusesoc_firm.core.request import GeneratorCall
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.render import render
 
 GRAPH_TEMPLATE = "dot/cores.dot"
@@ -25,22 +25,25 @@ GRAPH_TEMPLATE = "dot/cores.dot"
 class ProjectCore:
     """A core: the name, the files with the `.core` file first, the dependencies, and the generator calls.
 
-    `names` are the names by which other cores can depend on this core, and `depends` are the names of its dependencies.
-    Each name consists of vendor, library and name.
+    `names` are the names by which other cores can depend on this core; each consists of vendor, library and name.
+    `needs` are the dependencies as written, such as `>=acme:m:one:1.0`.
     """
 
     vlnv: str
     names: frozenset[str]
     files: tuple[Path, ...]
-    depends: frozenset[str]
+    needs: tuple[str, ...]
     calls: tuple[GeneratorCall, ...]
+
+    @property
+    def depends(self) -> frozenset[str]:
+        """The names of the dependencies, without relations and versions."""
+        return frozenset(map(short, self.needs))
 
 
 def project_cores() -> list[ProjectCore]:
     """Return all cores that `fusesoc` finds from the current folder, sorted by name."""
-    from fusesoc.fusesoc import Fusesoc
-
-    found = Fusesoc(configuration()).get_cores()
+    found = open_libraries().get_cores()
     return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
 
 
@@ -111,7 +114,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
     generated: dict[str, str] = {}
     sources: dict[str, None] = {}
     for item, flags in cores:
-        needed = [names.get(_short(str(depend)), "") for depend in item.get_depends(flags)]
+        needed = [names.get(short(str(depend)), "") for depend in item.get_depends(flags)]
         edges += [(str(item.name), name) for name in needed if name]
         for made in calls_of(item, flags):
             generated[made.vlnv] = made.generator
@@ -152,7 +155,9 @@ def solved(
         flags = {**top.get_flags(target), "target": target, **further}
         cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
     except DependencyError as error:
-        fail(f"{top.name} has an unknown dependency: {error.value}")
+        if faults := unsolved(fusesoc, top, flags):
+            raise InputError(faults) from error
+        fail(f"FuseSoC cannot resolve the dependencies of {top.name}", hint=" ".join(error.msg.split()))
     except RuntimeError as error:
         fail(str(error))
     return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
@@ -161,18 +166,21 @@ def solved(
 def _found(core: str) -> tuple[Any, Any]:
     """Return a FuseSoC instance, and the core with this name. May raise `InputError`."""
     from fusesoc.coremanager import DependencyError
-    from fusesoc.fusesoc import Fusesoc
 
-    fusesoc = Fusesoc(configuration())
+    fusesoc = open_libraries()
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
-        fail(f"unknown core '{core}'", hint="'fusesoc core list' lists all cores")
+        fail(f"unknown core '{core}'", hint=ignored(fusesoc, core) or "'fusesoc core list' lists all cores")
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
-    """Yield the generator calls that a FuseSoC core makes with these flags."""
-    for call in core.get_ttptttg(dict(flags)):
+    """Yield the generator calls that a FuseSoC core makes with these flags. May raise `InputError`."""
+    try:
+        calls = core.get_ttptttg(dict(flags))
+    except SyntaxError as error:
+        raise InputError([core_fault(core, error)]) from error
+    for call in calls:
         yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
 
 
@@ -181,12 +189,12 @@ def _core(vlnv: str, path: Path) -> ProjectCore:
     filesets = core.section("filesets").values()
     files = [word for fileset in filesets for item in _listed(fileset, "files") for word in _words(_file(item))]
     files += [str(item["command"]) for item in core.section("generators").values() if "command" in item]
-    depends = {_short(word) for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)}
+    needs = [word for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)]
     return ProjectCore(
         vlnv,
         frozenset(_names(core)),
         (path.resolve(), *((path.parent / file).resolve() for file in dict.fromkeys(files))),
-        frozenset(depends),
+        tuple(dict.fromkeys(needs)),
         tuple(_calls(vlnv, core)),
     )
 
@@ -212,7 +220,7 @@ def _call(vlnv: str, instance: str, generator: str, folder: Path | str, paramete
 
 def _names(core: CoreFile) -> list[str]:
     """Return the core's own name and the virtual names that it provides."""
-    return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
+    return [short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
 
 
 def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
@@ -239,7 +247,7 @@ def _words(item: object) -> list[str]:
         return [str(item)]
 
 
-def _short(name: str) -> str:
+def short(name: str) -> str:
     """Return a core's vendor, library and name, without the version; a name that FuseSoC rejects is unchanged."""
     from fusesoc.vlnv import Vlnv
 

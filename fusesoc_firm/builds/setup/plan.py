@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.setup.cores import calls_of, solved
 from fusesoc_firm.builds.setup.folder_lock import FolderLock
+from fusesoc_firm.builds.setup.libraries import ignored, open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
 from fusesoc_firm.builds.step.bench import SIMULATORS
 from fusesoc_firm.core.request import GeneratorCall
-from fusesoc_firm.text.diagnostics import Diagnostics, fail
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 TESTS = ("sim", "test")
 """The beginnings of the names of tests."""
@@ -35,6 +36,17 @@ class Plan:
     builds: tuple[Build, ...]
     options: RunOptions = field(default_factory=RunOptions)
     solver: Any = field(default=None, repr=False)
+
+    def sound(self) -> tuple[Plan, dict[Build, InputError]]:
+        """Return the plan of the builds with complete dependencies and known generators, and the others' faults."""
+        faults: dict[Build, InputError] = {}
+        for build in self.builds:
+            try:
+                for core, flags in self._cores(build):
+                    any(calls_of(core, flags))
+            except InputError as error:
+                faults[build] = error
+        return replace(self, builds=tuple(build for build in self.builds if build not in faults)), faults
 
     def generator_calls(self) -> list[GeneratorCall]:
         """Return the generator calls of all builds, each once. Raise `InputError` if a dependency is missing."""
@@ -129,14 +141,12 @@ def _matching_tests(name: str, tests: Collection[str], patterns: Sequence[str], 
 
 def _fusesoc(options: RunOptions, build_root: Path | None) -> Any:
     """Return a FuseSoC instance with its libraries, with FuseSoC's configuration for the current folder."""
-    from fusesoc.fusesoc import Fusesoc
-
     config = configuration()
     options.configure(config)
     # All builds would share a single work root.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
-    return Fusesoc(config)
+    return open_libraries(config)
 
 
 def _solver(options: RunOptions, build_root: Path | None) -> Any:
@@ -224,7 +234,8 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if targets and fitting else ""
-        faults.error(f"unknown core '{core}'", hint=listed or "'fusesoc core list' lists all cores")
+        hint = ignored(fusesoc, core) or listed or "'fusesoc core list' lists all cores"
+        faults.error(f"unknown core '{core}'", hint=hint)
         return None
 
 

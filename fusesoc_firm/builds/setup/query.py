@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore
-from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore, short
+from fusesoc_firm.builds.setup.libraries import newest, open_libraries
 from fusesoc_firm.builds.setup.selection import matching
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.json_text import json_text
@@ -51,9 +51,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class Cores:
-    """All cores by their full names, with the cores on which each depends directly."""
+    """All cores by their full names, with the cores on which each depends directly.
+
+    A dependency that no core satisfies is in `missing`, as written.
+    """
 
     needs: Mapping[str, tuple[str, ...]]
+    missing: frozenset[str] = frozenset()
 
     def deps(self, patterns: Sequence[str]) -> Answer:
         """Return the selected cores and all cores on which they depend. May raise `InputError`."""
@@ -69,7 +73,11 @@ class Cores:
         return self._answer(below & _reached(self._named([end]), self._needed_by()))
 
     def _named(self, patterns: Iterable[str]) -> list[str]:
-        return [name for pattern in patterns for name in named(self.needs, pattern)]
+        return [
+            name
+            for pattern in patterns
+            for name in ([pattern] if pattern in self.missing else named(self.needs, pattern))
+        ]
 
     def _needed_by(self) -> dict[str, tuple[str, ...]]:
         return {name: tuple(other for other, needs in self.needs.items() if name in needs) for name in self.needs}
@@ -77,21 +85,39 @@ class Cores:
     def _answer(self, names: Iterable[str]) -> Answer:
         found = sorted(names)
         edges = ((name, other) for name in found for other in self.needs[name] if other in found)
-        return Answer(("core",), tuple((name,) for name in found), tuple(edges))
+        rows = ((name, "missing" if name in self.missing else "") for name in found)
+        return Answer(("core", "state"), tuple(rows), tuple(edges))
 
 
 def core_dependencies(cores: Sequence[ProjectCore]) -> Cores:
-    """Return the dependencies between cores; several versions of a core count as one dependency each."""
+    """Return the dependencies between cores.
+
+    As in FuseSoC, the newest version that satisfies a dependency counts. All cores that provide a virtual name count,
+    since the target's flags decide between them.
+    """
     by_name: dict[str, list[str]] = {}
     for core in cores:
         for name in core.names:
             by_name.setdefault(name, []).append(core.vlnv)
-    return Cores(
-        {
-            core.vlnv: tuple(dict.fromkeys(other for name in sorted(core.depends) for other in by_name.get(name, ())))
-            for core in cores
-        }
-    )
+    needs: dict[str, tuple[str, ...]] = {}
+    missing: set[str] = set()
+    for core in cores:
+        found: list[str] = []
+        for depend in sorted(core.needs, key=short):
+            satisfying = _satisfying(depend, by_name.get(short(depend), ()))
+            missing |= set() if satisfying else {depend}
+            found += satisfying or [depend]
+        needs[core.vlnv] = tuple(dict.fromkeys(found))
+    return Cores({**dict.fromkeys(missing, ()), **needs}, frozenset(missing))
+
+
+def _satisfying(depend: str, providers: Sequence[str]) -> list[str]:
+    own = [name for name in providers if name.rpartition(":")[0] == short(depend)]
+    try:
+        chosen = newest(depend, own)
+    except SyntaxError:
+        return []
+    return [*([chosen] if chosen else ()), *(name for name in providers if name not in own)]
 
 
 def targets(patterns: Sequence[str], kind: str = "*") -> Answer:
@@ -118,9 +144,7 @@ def named(names: Iterable[str], pattern: str) -> list[str]:
 
 
 def _targets(patterns: Sequence[str]) -> list[tuple[str, str, str]]:
-    from fusesoc.fusesoc import Fusesoc
-
-    cores = Fusesoc(configuration()).get_cores()
+    cores = open_libraries().get_cores()
     chosen = dict.fromkeys(name for pattern in patterns for name in named(sorted(cores), pattern))
     return [
         (name, target, _kind(section))

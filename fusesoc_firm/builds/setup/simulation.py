@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.builds.setup.libraries import open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.plan import make_plan
 from fusesoc_firm.core.core_reader import read_core
@@ -120,7 +121,7 @@ class Simulation:
         self.build.log.parent.mkdir(parents=True, exist_ok=True)
         os.environ.setdefault("EDALIZE_LAUNCHER", shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
         environment = os.environ | {"MAKEFLAGS": "--no-print-directory", "PYTHONUNBUFFERED": "1"}
-        code = "import sys; from fusesoc.main import main; sys.exit(main())"
+        code = "from fusesoc_firm.builds.setup.libraries import main; main()"
         command = [sys.executable, "-c", code, "--monochrome", "run", f"--target={self.build.target}"]
         report = Report()
         # Frames of an earlier run must not be read as received in this one.
@@ -203,9 +204,7 @@ def _targets(core: Any) -> dict[str, str]:
 
 def _add_libraries(core: str, folder: Path | None) -> None:
     """Add our library and `folder` to FuseSoC's libraries, for this process and those that it starts, if missing."""
-    from fusesoc.fusesoc import Fusesoc
-
-    known = {name.rpartition(":")[0] for name in Fusesoc(configuration()).get_cores()}
+    known = {name.rpartition(":")[0] for name in open_libraries().get_cores()}
     places = [library_root()] if _LIBRARY_CORE not in known else []
     if folder and core.rpartition(":")[0] not in known and core not in known:
         places.append(folder.resolve())

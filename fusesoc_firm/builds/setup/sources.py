@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.setup.cores import calls_of, solved
-from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.builds.setup.libraries import open_libraries
 from fusesoc_firm.core.core_reader import core_name
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.library_path import library_root
@@ -74,10 +74,9 @@ def vhdl_sources(name: str, folder: Path) -> VhdlSources:
 
 def _with_libraries(name: str, folder: Path) -> Any:
     """Return a FuseSoC instance that knows our library and the core in `folder`."""
-    from fusesoc.fusesoc import Fusesoc
     from fusesoc.librarymanager import Library
 
-    fusesoc = Fusesoc(configuration())
+    fusesoc = open_libraries()
     for core, place in ((_LIBRARY_CORE, library_root()), (name, folder)):
         if core.rpartition(":")[0] not in {known.rpartition(":")[0] for known in fusesoc.get_cores()}:
             fusesoc.add_library(Library(str(place), str(place.resolve())))

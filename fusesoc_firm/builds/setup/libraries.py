@@ -1,0 +1,243 @@
+"""FuseSoC's libraries, in which a core that FuseSoC cannot use is reported with its file, and ignored.
+
+FuseSoC ignores the files that violate its schema. Other faults in a file would end the commands for all cores: a
+version that the solver rejects, a virtual name that is not a name, an alias that contains itself.
+"""
+
+from __future__ import annotations
+
+import logging
+import operator
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.core.core_reader import read_core
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
+from fusesoc_firm.text.outputs import shown
+
+_RELATIONS = {"==": operator.eq, ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
+_QUOTED = re.compile(r"'([^']+)'")
+_LOGGER = logging.getLogger(__name__)
+
+
+def open_libraries(config: Any = None) -> Any:
+    """Return a FuseSoC instance with the libraries of a configuration; the default is that of the current folder."""
+    from fusesoc import coremanager
+    from fusesoc.fusesoc import Fusesoc
+
+    # FuseSoC has no other way to read a core in a different manner.
+    coremanager.Core = _sound_core()
+    return Fusesoc(configuration() if config is None else config)
+
+
+def main() -> None:
+    """Run the command `fusesoc` with the arguments of this process."""
+    from fusesoc import coremanager
+    from fusesoc.main import main as run
+
+    coremanager.Core = _sound_core()
+    sys.exit(run())
+
+
+@cache
+def _sound_core() -> type:
+    """Return FuseSoC's class of cores, in which each fault of a file is a `SyntaxError`: FuseSoC ignores this file."""
+    from fusesoc.capi2.core import CoreInterface
+
+    class SoundCore(CoreInterface):  # type: ignore[misc]
+        def __post_init__(self) -> None:
+            try:
+                super().__post_init__()
+                for name in (self.name, *super().get_virtuals({})):
+                    _check_name(str(name))
+            except (SyntaxError, ImportError):
+                raise
+            except Exception as error:  # any content of a file may cause any exception
+                raise SyntaxError(" ".join(str(error).split()) or type(error).__name__) from error
+
+        def get_virtuals(self, flags: Mapping[str, Any] = {}) -> list[Any]:
+            try:
+                return [*super().get_virtuals(flags)]
+            except SyntaxError as error:
+                _warn(f"{shown(Path(self.core_file))}: a name under 'virtual' is ignored: {error.msg}")
+                return []
+
+        def get_depends(self, flags: Mapping[str, Any]) -> list[Any]:
+            depends = [*super().get_depends(flags)]
+            for item in depends:
+                _check_relation(item.depstr())
+            return depends
+
+    return SoundCore
+
+
+@cache
+def _warn(text: str) -> None:
+    _LOGGER.warning(text)
+
+
+@cache
+def _check_name(name: str) -> None:
+    """Raise an exception if FuseSoC's solver rejects a core's name."""
+    from fusesoc.vlnv import Vlnv
+    from okonomiyaki.versions import EnpkgVersion
+    from simplesat.constraints import PrettyPackageStringParser
+
+    known = Vlnv(name)
+    package = known.vln_str().replace(":", "_").replace("-", "__").lstrip("_")
+    try:
+        parser = PrettyPackageStringParser(EnpkgVersion.from_string)
+        parser.parse_to_package(f"{package} {known.version}-{known.revision}")
+    except ValueError as error:
+        raise SyntaxError(f"'{known.version:.40}' is not a version that FuseSoC can compare, such as 1.0.2") from error
+
+
+@cache
+def _check_relation(depend: str) -> None:
+    """Raise `SyntaxError` if a dependency's version cannot be compared."""
+    from fusesoc.vlnv import Vlnv
+
+    try:
+        for simple in Vlnv(depend).simpleVLNVs():
+            _version(simple)
+    except (ValueError, IndexError) as error:
+        raise SyntaxError(f"'{depend}' does not have a version that FuseSoC can compare, such as 1.0.2") from error
+
+
+def _version(name: Any) -> Any:
+    from okonomiyaki.versions import EnpkgVersion
+
+    return EnpkgVersion.from_string(f"{name.version}-{name.revision}")
+
+
+def newest(depend: str, providers: Iterable[str]) -> str | None:
+    """Return the newest of the cores that satisfies a dependency, such as `>=acme:m:one:1.0`, or None.
+
+    `providers` are full names of cores with the name of the dependency, or of cores that provide this virtual name.
+    Raise `SyntaxError` for an invalid dependency.
+    """
+    from fusesoc.vlnv import Vlnv
+
+    _check_relation(depend)
+    wanted = Vlnv(depend)
+
+    def fits(name: Any) -> bool:
+        # FuseSoC does not compare the versions of virtual names.
+        return name.vln_str() != wanted.vln_str() or all(
+            _RELATIONS[simple.relation](_version(name), _version(simple)) for simple in wanted.simpleVLNVs()
+        )
+
+    fitting = [name for name in map(Vlnv, providers) if fits(name)]
+    return str(max(fitting, key=_version)) if fitting else None
+
+
+def ignored(fusesoc: Any, core: str) -> str:
+    """Return why the file with a core of this name is ignored, or an empty text."""
+    for path, message in fusesoc.parse_errors:
+        try:
+            text = Path(path).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            continue
+        if core in text:
+            return f"{shown(Path(path))} is ignored: {' '.join(message.split())}"
+    return ""
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """A core, and the cores through which another one needs it, from that one on."""
+
+    core: Any
+    names: tuple[str, ...]
+
+
+def unsolved(fusesoc: Any, top: Any, flags: Mapping[str, Any]) -> list[Diagnostic]:
+    """Return the reasons why FuseSoC finds no cores for the dependencies of a core.
+
+    These are dependencies that no core satisfies, and cores with invalid filesets, or else cores that cannot be used
+    together.
+    """
+    faults = Diagnostics()
+    cores = fusesoc.get_cores()
+    providers: dict[str, list[str]] = {}
+    for name, core in cores.items():
+        for known in _names(core, flags):
+            providers.setdefault(known, []).append(name)
+    chains = {str(top.name): _Chain(top, (str(top.name),))}
+    waiting = [*chains.values()]
+    while waiting:
+        chain = waiting.pop(0)
+        for depend in _depends(fusesoc, chain.core, {**flags, "is_toplevel": chain.core is top}, faults):
+            known = providers.get(depend.vln_str(), [])
+            if (found := newest(depend.depstr(), known)) is None:
+                source, hint = _place(chain.core, _bare(depend)), _hint(fusesoc, depend, known)
+                through = f"needed by {' -> '.join(chain.names)}"
+                faults.error(_unsatisfied(depend, known), source, f"{through}; {hint}" if hint else through)
+            elif found not in chains:
+                chains[found] = _Chain(cores[found], (*chain.names, found))
+                waiting.append(chains[found])
+    return faults.found or [*_clashes([chain.core for chain in chains.values()], flags)]
+
+
+def _names(core: Any, flags: Mapping[str, Any]) -> list[str]:
+    return [name.vln_str() for name in (core.name, *core.get_virtuals(flags))]
+
+
+def _depends(fusesoc: Any, core: Any, flags: Mapping[str, Any], faults: Diagnostics) -> Iterator[Any]:
+    try:
+        depends = core.get_depends(flags)
+    except SyntaxError as error:
+        fault = core_fault(core, error)
+        faults.error(fault.message, fault.source)
+        return
+    for depend in depends:
+        fusesoc.cm.db._mapping_apply(depend)  # noqa: SLF001 - the only place that knows the mappings in use
+        yield depend
+
+
+def _bare(depend: Any) -> str:
+    """Return the name of a dependency, in which vendor and library may be missing."""
+    return str(depend.vln_str().lstrip(":"))
+
+
+def _unsatisfied(depend: Any, known: Sequence[str]) -> str:
+    name = _bare(depend)
+    return f"no known version of core '{name}' satisfies '{depend.depstr()}'" if known else f"unknown core '{name}'"
+
+
+def _hint(fusesoc: Any, depend: Any, known: Sequence[str]) -> str:
+    versions = ", ".join(name.rpartition(":")[2] for name in known)
+    return f"known versions: {versions}" if known else ignored(fusesoc, _bare(depend))
+
+
+def _clashes(cores: Iterable[Any], flags: Mapping[str, Any]) -> Iterator[Diagnostic]:
+    """Yield a fault for each name that several cores have, of which FuseSoC permits only one."""
+    by_name: dict[str, list[str]] = {}
+    for core in cores:
+        for name in _names(core, flags):
+            by_name.setdefault(name, []).append(str(core.name))
+    for name, found in by_name.items():
+        if len(found) > 1:
+            yield Diagnostic(f"{' and '.join(found)} are needed together, but only one core can be '{name}'")
+
+
+def core_fault(core: Any, error: SyntaxError) -> Diagnostic:
+    """Return FuseSoC's fault about the content of a core as a fault at the place of the first name in its message."""
+    message = str(error.msg).removeprefix(f"{core.name} : ")
+    named = _QUOTED.search(message)
+    return Diagnostic(message, _place(core, named[1] if named else ""))
+
+
+def _place(core: Any, word: str) -> SourceRef | None:
+    path = Path(core.core_file)
+    try:
+        source = read_core(path).place_of(word)
+    except InputError:
+        return None
+    return SourceRef(shown(path), source.line, source.column, source.text, source.width)
