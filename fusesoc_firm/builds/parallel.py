@@ -89,7 +89,7 @@ def _build(plan: Plan, how: How, listener: Listener) -> Generator[Outcome, None,
         from fusesoc_firm.builds.project import check_locked
 
         for core in dict.fromkeys(build.core for build in plan.builds):
-            check_locked(core)
+            check_locked(core, plan.options)
     options = ["--setup"] * how.is_setup_only + ["--clean"] * how.is_clean
     if how.cluster:
         yield from _build_on_cluster(plan, how, listener, options)

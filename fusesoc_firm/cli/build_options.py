@@ -115,12 +115,24 @@ def is_sandboxed(arguments: argparse.Namespace) -> bool:
     return True
 
 
+def add_selectors(parser: argparse._ActionsContainer) -> None:
+    """Add the options that select between cores, for `selectors_of`."""
+    parser.add_argument("--flag", action="append", default=[], help="a use flag; -FLAG clears it: --flag=-FLAG")
+    parser.add_argument("--mapping", action="append", default=[], metavar="CORE", help="a core whose mapping applies")
+
+
+def selectors_of(arguments: argparse.Namespace) -> RunOptions:
+    """Return the options that select between cores."""
+    from fusesoc_firm.builds.setup.run_options import RunOptions
+
+    return RunOptions(flags=tuple(arguments.flag), mappings=tuple(arguments.mapping))
+
+
 def add_fusesoc(parser: argparse.ArgumentParser) -> None:
     """Add the options of `fusesoc run`, for `run_options_of`."""
     group = parser.add_argument_group("options of 'fusesoc run'")
-    group.add_argument("--flag", action="append", default=[], help="a use flag; -FLAG clears it: --flag=-FLAG")
+    add_selectors(group)
     group.add_argument("--tool", default="", help="another tool for targets with 'default_tool'")
-    group.add_argument("--mapping", action="append", default=[], metavar="CORE", help="a core whose mapping applies")
     group.add_argument("--lockfile", type=Path, metavar="FILE", help="FuseSoC's lock file, with versions of cores")
     for name, text in _VALUES.items():
         group.add_argument(name, action="append", default=[], metavar="NAME", help=text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from fusesoc_firm.cli.build_options import add_selectors, selectors_of
 from fusesoc_firm.cli.common import add_picture, command
 
 
@@ -36,6 +37,7 @@ def add_project(commands: Any) -> None:
         _lock,
     )
     lock.add_argument("core", metavar="CORE", help="the core's name in FuseSoC")
+    add_selectors(lock)
     lock.add_argument(
         "--locked", action="store_true", help="write nothing; report differences from the lock file as errors"
     )
@@ -62,7 +64,8 @@ def _lock(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.builds.project import check_locked, write_lock
     from fusesoc_firm.text.outputs import shown
 
+    options = selectors_of(arguments)
     if arguments.locked:
-        print(f"{shown(check_locked(arguments.core))}: nothing differs")
+        print(f"{shown(check_locked(arguments.core, options))}: nothing differs")
     else:
-        print(shown(write_lock(arguments.core)))
+        print(shown(write_lock(arguments.core, options)))

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from fusesoc_firm.cli.build_options import add_selectors, selectors_of
 from fusesoc_firm.cli.common import command
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def add_query(commands: Any) -> None:
     questions = query.add_subparsers(title="questions", metavar="QUESTION", required=True)
     deps = _add(questions, "deps", "list cores and all cores on which they depend", "robot:sys:quat2euler", _deps)
     _add_cores(deps)
+    add_selectors(deps)
     rdeps = _add(questions, "rdeps", "list cores and all cores that depend on them", "robot:axis:firm_axis", _rdeps)
     _add_cores(rdeps)
     paths = _add(
@@ -45,6 +47,7 @@ def add_query(commands: Any) -> None:
     )
     generated.add_argument("core", metavar="CORE", help="a core's name in FuseSoC")
     generated.add_argument("--target", default="default", metavar="NAME", help="the core's target (default: default)")
+    add_selectors(generated)
     text = "list the cores' targets and their kinds"
     targets = _add(questions, "targets", text, "'robot:sys:*' --kind sim", _targets)
     _add_cores(targets)
@@ -79,7 +82,13 @@ def _cores() -> Cores:
 
 
 def _deps(arguments: argparse.Namespace) -> Answer:
-    return _cores().deps(arguments.cores)
+    from fusesoc_firm.builds.setup.cores import dependencies
+
+    cores, options = _cores(), selectors_of(arguments)
+    if not (options.flags or options.mappings):
+        return cores.deps(arguments.cores)
+    used = [dependencies(name, options) for name in cores.named(arguments.cores)]
+    return cores.among({core.vlnv for top, depends in used for core in (top, *depends)})
 
 
 def _rdeps(arguments: argparse.Namespace) -> Answer:
@@ -93,7 +102,7 @@ def _allpaths(arguments: argparse.Namespace) -> Answer:
 def _generated(arguments: argparse.Namespace) -> Answer:
     from fusesoc_firm.builds.project import generated_files
 
-    return generated_files(arguments.core, arguments.target)
+    return generated_files(arguments.core, arguments.target, selectors_of(arguments))
 
 
 def _targets(arguments: argparse.Namespace) -> Answer:

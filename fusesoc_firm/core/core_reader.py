@@ -46,21 +46,16 @@ class CoreFile:
 
     def item(self, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
         """Return the key and value nodes of an item in nested mappings, as written, or None if it is missing."""
-        node, found = self.text.root, None
-        for key in keys:
-            pairs = node.value if isinstance(node, yaml.MappingNode) else ()
-            if (found := next((pair for pair in pairs if pair[0].value == key), None)) is None:
-                return None
-            node = found[1]
-        return found
+        return pair_of(self.text.root, *keys)
 
     def source(self, node: yaml.Node) -> SourceRef:
         """Return the place of a node."""
         return self.text.source(node)
 
     def place_of(self, word: str) -> SourceRef:
-        """Return the place of the first text that contains a word, or of the whole content."""
-        waiting, seen = [self.text.root], set()
+        """Return the place of the first text that contains a word, or of the beginning."""
+        waiting: list[yaml.Node] = [self.text.root] if self.text.root else []
+        seen: set[int] = set()
         while waiting:
             node = waiting.pop(0)
             if isinstance(node, yaml.ScalarNode) and word in node.value:
@@ -71,7 +66,18 @@ class CoreFile:
                 items = node.value
                 inner = [part for pair in items for part in pair] if isinstance(node, yaml.MappingNode) else items
                 waiting[:0] = inner
-        return self.source(self.text.root)
+        return SourceRef(str(self.path), 1, 1)
+
+
+def pair_of(node: yaml.Node | None, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
+    """Return the key and value nodes of an item in nested mappings, as written, or None if it is missing."""
+    found = None
+    for key in keys:
+        pairs = node.value if isinstance(node, yaml.MappingNode) else ()
+        if (found := next((pair for pair in pairs if pair[0].value == key), None)) is None:
+            return None
+        node = found[1]
+    return found
 
 
 def read_core(path: Path) -> CoreFile:

@@ -130,6 +130,11 @@ def is_prefix(text: str) -> bool:
     return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
 
 
+def is_library(text: str) -> bool:
+    """Return whether a text is a legal name for a VHDL library of generated files."""
+    return is_prefix(text) and text not in VHDL_KEYWORDS and text not in ("ieee", "std", "work")
+
+
 def prefixed(prefix: str, name: str) -> str:
     """Return `<prefix>_<name>`, or the name alone if the prefix is empty."""
     return f"{prefix}_{name}" if prefix else name

@@ -458,6 +458,13 @@ def test_what_is_not_cached_is_reported(library: Path) -> None:
         assert line.format(library / "counter" / "limit.txt") in text.splitlines()
 
 
+def test_without_export_nothing_is_cached(library: Path) -> None:
+    for _ in range(2):
+        status, text = run(library, "acme:m:counter", "--target", "sim", "--no-export")
+        assert (status, results(text)) == (0, {"sim": "passed"})
+        assert "is not cached: with --no-export, its inputs are not in the folder of the build" in text
+
+
 def test_a_selected_target_may_have_any_name(library: Path) -> None:
     for arguments in (["acme:m:counter@bench"], ["acme:m:counter", "--target", "bench"]):
         status, text = run(library, *arguments)

@@ -28,7 +28,7 @@ def make_request(call: GeneratorCall, parameters: Iterable[Parameter], find: Cor
     folder = Path(call.files_root)
     origin = find_requesting_core(folder, call.vlnv.split(":")[2])
     checked = check_parameters(call.parameters, parameters, origin)
-    places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
+    places = {name: origin.items(name, value) for name, value in checked.items() if isinstance(value, list)}
     request = Request(call.generator, call.vlnv, folder, checked, places, MessageFolders(find))
     faults = Diagnostics()
     for name, source in request.listed("messages").items():

@@ -30,6 +30,8 @@ _IGNORE = "FUSESOC_IGNORE"
 _MESSAGES, _UNITS = "firm_messages.run", "firm_units.run"
 _VHDL = re.compile(rb"^[ \t]*(?:entity|package)[ \t]+(\w+)[ \t\r\n]+is\b", re.MULTILINE | re.IGNORECASE)
 _VERILOG = re.compile(rb"^[ \t]*module[ \t]+(\w+)", re.MULTILINE)
+# In a generated `.core`; all files have the same library.
+_LIBRARY = re.compile(rb"^ *logical_name: (\w+)$", re.MULTILINE)
 _PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
 
 
@@ -75,12 +77,17 @@ def message_folders(generated: str, core: str, run: str | None) -> list[str]:
 
 
 def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the VHDL names of the design units in generated files, each with the digest of its file."""
+    """Return the VHDL names of the design units in generated files, each with the digest of its file.
+
+    Units of a VHDL library have its name before their own, since other libraries may have units of the same name.
+    """
+    library = _LIBRARY.search([*files.values()][-1]) if files else None
+    prefix = f"{library[1].decode()}." if library else ""
     found: dict[str, str] = {}
     for name, content in files.items():
         if pattern := _PATTERNS.get(os.path.splitext(name)[1].lower()):
             digest = hashlib.sha256(content).hexdigest()
-            found |= dict.fromkeys((unit.decode().lower() for unit in pattern.findall(content)), digest)
+            found |= dict.fromkeys((f"{prefix}{unit.decode().lower()}" for unit in pattern.findall(content)), digest)
     return found
 
 

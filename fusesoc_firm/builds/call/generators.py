@@ -13,7 +13,7 @@ from fusesoc_firm.builds.call import message_core
 from fusesoc_firm.builds.call.parameters import Parameter
 from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
-from fusesoc_firm.text.naming import PREFIX_RULE, is_prefix
+from fusesoc_firm.text.naming import PREFIX_RULE, is_library, is_prefix
 from fusesoc_firm.tools.programs import simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
 
@@ -41,7 +41,13 @@ class Generator:
 def _load_converters(request: Request) -> LoadedRequest:
     from fusesoc_firm.converter import converter_core
 
-    return converter_core.load(request)
+    loaded = converter_core.load(request)
+    library = str(request.parameters["logical_name"] or "")
+    return replace(loaded, generate=lambda: _in_library(loaded.generate(), library)) if library else loaded
+
+
+def _in_library(core: GeneratedCore, library: str) -> GeneratedCore:
+    return replace(core, files={name: replace(file, logical_name=library) for name, file in core.files.items()})
 
 
 def _load_system(request: Request) -> LoadedRequest:
@@ -120,6 +126,12 @@ GENERATORS: Mapping[str, Generator] = {
                 "str",
                 "prefix for the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
+            ),
+            Parameter(
+                "logical_name",
+                "str",
+                "the VHDL library of all generated files (default: the one of files without a library)",
+                rule=(f"{PREFIX_RULE}, and no library of the language", is_library),
             ),
             Parameter(
                 "pipeline",

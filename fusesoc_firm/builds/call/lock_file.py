@@ -23,9 +23,8 @@ from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.yaml_text import data_in, yaml_dump
-from fusesoc_firm.tools.digests import digest, digest_of
+from fusesoc_firm.tools.digests import digest
 from fusesoc_firm.tools.programs import debian_package, facts_of, installed_programs, packages
-from fusesoc_firm.tools.reads import Input
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """Facts by kind (`messages`, `cores`, `tools`), by the item's name, and by the fact's name."""
@@ -42,24 +41,20 @@ def lock_path(core: ProjectCore) -> Path:
     return core.files[0].with_suffix(".lock")
 
 
-def lock_of(
-    core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
-) -> Lock:
-    """Return the definitions, cores and tools that a core now uses, directly or through the cores in `depends`.
+def lock_of(generated: Sequence[LoadedRequest], cores: Mapping[str, str]) -> Lock:
+    """Return the definitions, cores and tools that a core now uses, directly or through its dependencies.
 
-    `generated` maps each core's name to its derived requests. If two cores use a message from different sources, the
-    message is listed for each core.
+    `generated` are the derived requests, those of the core itself first; `cores` maps the names of the dependencies to
+    the digests of their inputs. If two cores use a message from different sources, the message is listed for each core.
     """
-    depends = list(depends)
     messages: dict[str, dict[str, str]] = {}
-    for item in (core, *depends):
-        for loaded in generated.get(item.vlnv, ()):
-            for label, facts in _messages(loaded).items():
-                if messages.setdefault(label, facts) != facts:
-                    messages[_of_request(label, loaded)] = facts
+    for loaded in generated:
+        for label, facts in _messages(loaded).items():
+            if messages.setdefault(label, facts) != facts:
+                messages[_of_request(label, loaded)] = facts
     return {
         "messages": dict(sorted(messages.items())),
-        "cores": {item.vlnv: {"sha256": _digest_of_core(item, generated.get(item.vlnv, ()))} for item in depends},
+        "cores": {name: {"sha256": digest} for name, digest in cores.items()},
         "tools": _tools(),
     }
 
@@ -155,29 +150,6 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
         "sha256": digest(library.content(name)),
         "signature": signature(name, library.closure(name)),
     }
-
-
-def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
-    """Return the digest of a core's files and of its generated cores' inputs.
-
-    Names are relative to the `.core` file.
-    """
-    folder = core.files[0].parent
-    made_of = [item for loaded in generated for item in loaded.inputs]
-    return digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
-
-
-def _named(item: Input, folder: Path) -> str:
-    """Return an input's name relative to a folder."""
-    if isinstance(item, Path):
-        return os.path.relpath(item.resolve(), folder)
-    return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"
-
-
-def _digest(item: Input) -> str | None:
-    if not isinstance(item, Path):
-        return digest(item.content)
-    return digest(item.read_bytes()) if item.is_file() else None
 
 
 def _tools() -> dict[str, dict[str, str]]:

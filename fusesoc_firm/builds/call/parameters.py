@@ -73,7 +73,7 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
                 hint = f"alternatively, set '{replacing[name]}'" if name in replacing else ""
                 faults.error(f"parameter '{name}' is missing: {parameter.meaning}", origin.instance(), hint)
         elif fault := _fault(parameter, given[name]):
-            faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))
+            faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name, given[name]))
     faults.raise_if_any()
     return {name: given.get(name, parameter.default) for name, parameter in table.items()}
 

@@ -6,27 +6,36 @@ A core is read for all targets and flags together, so that the result includes e
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import yaml
+
+from fusesoc_firm.builds.setup.folder_lock import FolderLock
 from fusesoc_firm.builds.setup.libraries import core_fault, ignored, open_libraries, unsolved
+from fusesoc_firm.builds.setup.run_options import RunOptions
+from fusesoc_firm.builds.setup.scripts import script_files
 from fusesoc_firm.core.core_reader import CoreFile, read_core
 from fusesoc_firm.core.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.outputs import shown
 from fusesoc_firm.text.render import render
+from fusesoc_firm.text.yaml_text import yaml_data
 
 GRAPH_TEMPLATE = "dot/cores.dot"
+_NO_OPTIONS = RunOptions()
 
 
 @dataclass(frozen=True)
 class ProjectCore:
     """A core: the name, the files with the `.core` file first, the dependencies, and the generator calls.
 
-    `names` are the names by which other cores can depend on this core; each consists of vendor, library and name.
-    `needs` are the dependencies as written, such as `>=acme:m:one:1.0`.
+    `names` are the names by which other cores can depend on this core, or under a mapping; each consists of vendor,
+    library and name. `files` may be folders, or missing. `needs` are the dependencies as written, such as
+    `>=acme:m:one:1.0`. `fetched` is the folder with the sources of a provider, or None.
     """
 
     vlnv: str
@@ -34,6 +43,7 @@ class ProjectCore:
     files: tuple[Path, ...]
     needs: tuple[str, ...]
     calls: tuple[GeneratorCall, ...]
+    fetched: Path | None = None
 
     @property
     def depends(self) -> frozenset[str]:
@@ -44,29 +54,62 @@ class ProjectCore:
 def project_cores() -> list[ProjectCore]:
     """Return all cores that `fusesoc` finds from the current folder, sorted by name."""
     found = open_libraries().get_cores()
-    return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
+    mapped = _mapped(found.values())
+    return [_core(found[name], mapped) for name in sorted(found)]
 
 
-def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
+def _mapped(cores: Iterable[Any]) -> dict[str, list[str]]:
+    """Return the names that cores replace by each name, if a user selects the mappings of these cores."""
+    replaced: dict[str, list[str]] = {}
+    for core in cores:
+        for name, other in core.mapping.items():
+            replaced.setdefault(short(other), []).append(short(name))
+    return replaced
+
+
+def dependencies(core: str, options: RunOptions) -> tuple[ProjectCore, list[ProjectCore]]:
     """Return a core and all cores that any of its targets depends on, sorted by name.
 
-    Raise `InputError` if the core or one of its dependencies is missing.
+    The mappings and flags of `options` apply. Sources of providers are fetched. Raise `InputError` if the core or one
+    of its dependencies is missing.
     """
-    fusesoc, top = _found(core)
-    needed: dict[str, Path] = {}
+    fusesoc, top = _found(core, options)
+    needed: dict[str, Any] = {}
     for target in top.get_data({}).targets:
-        needed |= {str(item.name): Path(item.core_file) for item, _ in solved(fusesoc, top, target)}
+        needed |= {str(item.name): item for item, _ in solved(fusesoc, top, target, options.use_flags())}
     needed.pop(str(top.name), None)
-    return _core(str(top.name), Path(top.core_file)), [_core(name, needed[name]) for name in sorted(needed)]
+    for item in needed.values():
+        fetch(item)
+    return _core(top, {}), [_core(needed[name], {}) for name in sorted(needed)]
 
 
-def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
+def fetch(core: Any) -> None:
+    """Download the sources of a core with a provider, unless they are here; FuseSoC cannot do this in parallel."""
+    if not core.provider or core.cache_status() == "downloaded":
+        return
+    lock = FolderLock(Path(f"{core.files_root}.lock"))
+    if owner := lock.acquire():
+        fail(f"{core.name} is being downloaded by {owner}", hint="run the command again after the download")
+    try:
+        core.setup()
+    finally:
+        lock.release()
+
+
+def affected(
+    cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None], gone: Mapping[str, str]
+) -> dict[str, str]:
     """Return the names of the cores that are touched or depend on a touched core, each with the reason.
 
-    The result is in the order of `cores`. `touches` returns the touched part of a core, or None.
+    The result is in the order of `cores`. `touches` returns the touched part of a core, or None. `gone` are names that
+    no core has any longer, each with the file that had it.
     """
     cores = list(cores)
-    reasons = {core.vlnv: reason for core in cores if (reason := touches(core))}
+    reasons = {
+        core.vlnv: reason
+        for core in cores
+        if (reason := touches(core) or next((gone[name] for name in sorted(core.depends & gone.keys())), None))
+    }
     new = set(reasons)
     while new:
         by_name = {name: core.vlnv for core in cores if core.vlnv in new for name in core.names}
@@ -92,6 +135,27 @@ def changed_files(revision: str, folder: Path) -> list[Path]:
     return sorted({root / name for name in listed.split("\0") if name})
 
 
+def former_names(revision: str, folder: Path, cores: Iterable[ProjectCore]) -> dict[str, str]:
+    """Return the names that cores had at a revision, and no longer have, each with the path of its `.core` file."""
+    names = {core.files[0]: core.names for core in cores}
+    found: dict[str, str] = {}
+    root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
+    for path in changed_files(revision, folder):
+        name = str(path.relative_to(root))
+        if path.suffix == ".core" and _git(root, "ls-tree", "--name-only", revision, "--", name):
+            former = _names_in(_git(root, "show", f"{revision}:{name}"))
+            found |= dict.fromkeys(former - names.get(path.resolve(), frozenset()), shown(path.resolve()))
+    return found
+
+
+def _names_in(text: str) -> frozenset[str]:
+    try:
+        data = yaml_data(text)
+    except yaml.YAMLError:
+        return frozenset()
+    return frozenset(_names(data) if isinstance(data, dict) else ())
+
+
 def _git(folder: Path, *arguments: str) -> str:
     try:
         done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
@@ -109,7 +173,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
     """
     fusesoc, top = _found(core)
     cores = solved(fusesoc, top, target)
-    names = {name: str(item.name) for item, _ in cores for name in _names(read_core(Path(item.core_file)))}
+    names = {name: str(item.name) for item, _ in cores for name in _names(read_core(Path(item.core_file)).data)}
     edges: list[tuple[str, str]] = []
     generated: dict[str, str] = {}
     sources: dict[str, None] = {}
@@ -133,10 +197,10 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
     )
 
 
-def target_calls(core: str, target: str) -> list[tuple[str, GeneratorCall]]:
+def target_calls(core: str, target: str, options: RunOptions) -> list[tuple[str, GeneratorCall]]:
     """Return the generator calls of a core's target, each with the requesting core. May raise `InputError`."""
-    fusesoc, top = _found(core)
-    cores = solved(fusesoc, top, target)
+    fusesoc, top = _found(core, options)
+    cores = solved(fusesoc, top, target, options.use_flags())
     return [(str(item.name), call) for item, flags in cores for call in calls_of(item, flags)]
 
 
@@ -163,11 +227,12 @@ def solved(
     return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
 
 
-def _found(core: str) -> tuple[Any, Any]:
-    """Return a FuseSoC instance, and the core with this name. May raise `InputError`."""
+def _found(core: str, options: RunOptions = _NO_OPTIONS) -> tuple[Any, Any]:
+    """Return a FuseSoC instance to which the mappings apply, and the core with this name. May raise `InputError`."""
     from fusesoc.coremanager import DependencyError
 
     fusesoc = open_libraries()
+    options.apply(fusesoc)
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
@@ -184,22 +249,49 @@ def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
         yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
 
 
-def _core(vlnv: str, path: Path) -> ProjectCore:
-    core = read_core(path)
+def _core(found: Any, mapped: Mapping[str, Sequence[str]]) -> ProjectCore:
+    """Return the parts of a FuseSoC core; `mapped` are the names that mappings replace by each name."""
+    vlnv, core = str(found.name), read_core(Path(found.core_file))
     filesets = core.section("filesets").values()
-    files = [word for fileset in filesets for item in _listed(fileset, "files") for word in _words(_file(item))]
-    files += [str(item["command"]) for item in core.section("generators").values() if "command" in item]
     needs = [word for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)]
+    names = _names(core.data)
+    fetched = Path(found.files_root).resolve() if found.provider else None
+    roots = [core.path.parent, *([fetched] if fetched else ())]
+    files = [(root / file).resolve() for file in dict.fromkeys(_files(core)) for root in roots]
+    scripts = [
+        file.resolve()
+        for item in core.section("generators").values()
+        for root in roots
+        for file in script_files(root / str(item.get("command", "")))
+    ]
     return ProjectCore(
         vlnv,
-        frozenset(_names(core)),
-        (path.resolve(), *((path.parent / file).resolve() for file in dict.fromkeys(files))),
+        frozenset((*names, *(other for name in names for other in mapped.get(name, ())))),
+        tuple(dict.fromkeys((core.path.resolve(), *files, *scripts, *([fetched] if fetched else ())))),
         tuple(dict.fromkeys(needs)),
-        tuple(_calls(vlnv, core)),
+        tuple(_calls(vlnv, core, Path(found.files_root))),
+        fetched,
     )
 
 
-def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
+def _files(core: CoreFile) -> Iterator[str]:
+    """Yield a core's files and folders: in filesets, patches, and values of parameters of the type `file`."""
+    for fileset in core.section("filesets").values():
+        for item in _listed(fileset, "files"):
+            yield from _words(_file(item))
+    provider = core.data.get("provider")
+    yield from map(str, _listed(provider, "patches") if isinstance(provider, dict) else ())
+    kinds = core.section("parameters")
+    values = {name: str(item.get("default") or "") for name, item in kinds.items()}
+    given = [f"{name}={value}" for name, value in values.items()]
+    for target in core.section("targets").values():
+        given += [word for item in _listed(target, "parameters") for word in _words(item)]
+    for name, _, value in (word.partition("=") for word in given):
+        if value and kinds.get(name, {}).get("datatype", "file") == "file":
+            yield value
+
+
+def _calls(vlnv: str, core: CoreFile, folder: Path) -> Iterator[GeneratorCall]:
     """Yield the call of each generator instance, and another call for each target that changes its parameters."""
     known = core.section("generate")
     changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
@@ -208,7 +300,7 @@ def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
             changes += item.items() if isinstance(item, dict) else ()
     for name, changed in changes:
         generator = str(known.get(name, {}).get("generator"))
-        yield _call(vlnv, name, generator, core.path.parent, {**core.parameters(name), **(changed or {})})
+        yield _call(vlnv, name, generator, folder, {**core.parameters(name), **(changed or {})})
 
 
 def _call(vlnv: str, instance: str, generator: str, folder: Path | str, parameters: Mapping[str, Any]) -> GeneratorCall:
@@ -218,9 +310,10 @@ def _call(vlnv: str, instance: str, generator: str, folder: Path | str, paramete
     )
 
 
-def _names(core: CoreFile) -> list[str]:
-    """Return the core's own name and the virtual names that it provides."""
-    return [short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
+def _names(data: Mapping[str, Any]) -> list[str]:
+    """Return a core's own name and the virtual names that it provides under any flags."""
+    virtual = (word for item in data.get("virtual") or () for word in _words(item))
+    return [short(str(name)) for name in (data.get("name", ""), *virtual)]
 
 
 def _listed(section: Mapping[str, Any], key: str) -> list[Any]:

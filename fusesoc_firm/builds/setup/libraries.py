@@ -6,7 +6,6 @@ version that the solver rejects, a virtual name that is not a name, an alias tha
 
 from __future__ import annotations
 
-import logging
 import operator
 import re
 import sys
@@ -23,97 +22,33 @@ from fusesoc_firm.text.outputs import shown
 
 _RELATIONS = {"==": operator.eq, ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 _QUOTED = re.compile(r"'([^']+)'")
-_LOGGER = logging.getLogger(__name__)
 
 
 def open_libraries(config: Any = None) -> Any:
     """Return a FuseSoC instance with the libraries of a configuration; the default is that of the current folder."""
-    from fusesoc import coremanager
     from fusesoc.fusesoc import Fusesoc
 
-    # FuseSoC has no other way to read a core in a different manner.
-    coremanager.Core = _sound_core()
+    _prepare()
     return Fusesoc(configuration() if config is None else config)
 
 
 def main() -> None:
     """Run the command `fusesoc` with the arguments of this process."""
-    from fusesoc import coremanager
     from fusesoc.main import main as run
 
-    coremanager.Core = _sound_core()
+    _prepare()
     sys.exit(run())
 
 
 @cache
-def _sound_core() -> type:
-    """Return FuseSoC's class of cores, in which each fault of a file is a `SyntaxError`: FuseSoC ignores this file."""
-    from fusesoc.capi2.core import CoreInterface
+def _prepare() -> None:
+    """Extend FuseSoC's cores and generator calls in this process, for which FuseSoC has no other way."""
+    from fusesoc import coremanager, edalizer
 
-    class SoundCore(CoreInterface):  # type: ignore[misc]
-        def __post_init__(self) -> None:
-            try:
-                super().__post_init__()
-                for name in (self.name, *super().get_virtuals({})):
-                    _check_name(str(name))
-            except (SyntaxError, ImportError):
-                raise
-            except Exception as error:  # any content of a file may cause any exception
-                raise SyntaxError(" ".join(str(error).split()) or type(error).__name__) from error
+    from fusesoc_firm.builds.setup.fusesoc_parts import LockedCall, SoundCore
 
-        def get_virtuals(self, flags: Mapping[str, Any] = {}) -> list[Any]:
-            try:
-                return [*super().get_virtuals(flags)]
-            except SyntaxError as error:
-                _warn(f"{shown(Path(self.core_file))}: a name under 'virtual' is ignored: {error.msg}")
-                return []
-
-        def get_depends(self, flags: Mapping[str, Any]) -> list[Any]:
-            depends = [*super().get_depends(flags)]
-            for item in depends:
-                _check_relation(item.depstr())
-            return depends
-
-    return SoundCore
-
-
-@cache
-def _warn(text: str) -> None:
-    _LOGGER.warning(text)
-
-
-@cache
-def _check_name(name: str) -> None:
-    """Raise an exception if FuseSoC's solver rejects a core's name."""
-    from fusesoc.vlnv import Vlnv
-    from okonomiyaki.versions import EnpkgVersion
-    from simplesat.constraints import PrettyPackageStringParser
-
-    known = Vlnv(name)
-    package = known.vln_str().replace(":", "_").replace("-", "__").lstrip("_")
-    try:
-        parser = PrettyPackageStringParser(EnpkgVersion.from_string)
-        parser.parse_to_package(f"{package} {known.version}-{known.revision}")
-    except ValueError as error:
-        raise SyntaxError(f"'{known.version:.40}' is not a version that FuseSoC can compare, such as 1.0.2") from error
-
-
-@cache
-def _check_relation(depend: str) -> None:
-    """Raise `SyntaxError` if a dependency's version cannot be compared."""
-    from fusesoc.vlnv import Vlnv
-
-    try:
-        for simple in Vlnv(depend).simpleVLNVs():
-            _version(simple)
-    except (ValueError, IndexError) as error:
-        raise SyntaxError(f"'{depend}' does not have a version that FuseSoC can compare, such as 1.0.2") from error
-
-
-def _version(name: Any) -> Any:
-    from okonomiyaki.versions import EnpkgVersion
-
-    return EnpkgVersion.from_string(f"{name.version}-{name.revision}")
+    coremanager.Core = edalizer.Core = SoundCore
+    edalizer.Ttptttg = LockedCall
 
 
 def newest(depend: str, providers: Iterable[str]) -> str | None:
@@ -124,17 +59,19 @@ def newest(depend: str, providers: Iterable[str]) -> str | None:
     """
     from fusesoc.vlnv import Vlnv
 
-    _check_relation(depend)
+    from fusesoc_firm.builds.setup.fusesoc_parts import check_relation, version
+
+    check_relation(depend)
     wanted = Vlnv(depend)
 
     def fits(name: Any) -> bool:
         # FuseSoC does not compare the versions of virtual names.
         return name.vln_str() != wanted.vln_str() or all(
-            _RELATIONS[simple.relation](_version(name), _version(simple)) for simple in wanted.simpleVLNVs()
+            _RELATIONS[simple.relation](version(name), version(simple)) for simple in wanted.simpleVLNVs()
         )
 
     fitting = [name for name in map(Vlnv, providers) if fits(name)]
-    return str(max(fitting, key=_version)) if fitting else None
+    return str(max(fitting, key=version)) if fitting else None
 
 
 def ignored(fusesoc: Any, core: str) -> str:
@@ -166,9 +103,9 @@ def unsolved(fusesoc: Any, top: Any, flags: Mapping[str, Any]) -> list[Diagnosti
     faults = Diagnostics()
     cores = fusesoc.get_cores()
     providers: dict[str, list[str]] = {}
-    for name, core in cores.items():
-        for known in _names(core, flags):
-            providers.setdefault(known, []).append(name)
+    for vlnv, core in cores.items():
+        for name in _names(core, flags):
+            providers.setdefault(name, []).append(vlnv)
     chains = {str(top.name): _Chain(top, (str(top.name),))}
     waiting = [*chains.values()]
     while waiting:
@@ -225,6 +162,14 @@ def _clashes(cores: Iterable[Any], flags: Mapping[str, Any]) -> Iterator[Diagnos
     for name, found in by_name.items():
         if len(found) > 1:
             yield Diagnostic(f"{' and '.join(found)} are needed together, but only one core can be '{name}'")
+
+
+def check_files(core: Any, flags: Mapping[str, Any]) -> None:
+    """Raise `InputError` if a file of a core would be copied out of the build folder."""
+    try:
+        core.get_files(dict(flags))
+    except SyntaxError as error:
+        raise InputError([core_fault(core, error)]) from error
 
 
 def core_fault(core: Any, error: SyntaxError) -> Diagnostic:

@@ -8,15 +8,14 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.builds.setup.cores import calls_of, solved
-from fusesoc_firm.builds.setup.folder_lock import FolderLock
-from fusesoc_firm.builds.setup.libraries import ignored, open_libraries
+from fusesoc_firm.builds.setup.cores import calls_of, fetch, solved
+from fusesoc_firm.builds.setup.libraries import check_files, ignored, open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
 from fusesoc_firm.builds.step.bench import SIMULATORS
 from fusesoc_firm.core.request import GeneratorCall
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 TESTS = ("sim", "test")
 """The beginnings of the names of tests."""
@@ -38,11 +37,12 @@ class Plan:
     solver: Any = field(default=None, repr=False)
 
     def sound(self) -> tuple[Plan, dict[Build, InputError]]:
-        """Return the plan of the builds with complete dependencies and known generators, and the others' faults."""
+        """Return the plan of the builds with valid dependencies, files and generator calls, and the others' faults."""
         faults: dict[Build, InputError] = {}
         for build in self.builds:
             try:
                 for core, flags in self._cores(build):
+                    check_files(core, flags)
                     any(calls_of(core, flags))
             except InputError as error:
                 faults[build] = error
@@ -58,20 +58,10 @@ class Plan:
         return list(found.values())
 
     def fetch(self) -> None:
-        """Download remote cores with FuseSoC, which cannot do this in parallel."""
+        """Download the sources of all cores with a provider."""
         for build in self.builds:
             for core, _ in self._cores(build):
-                if core.provider and core.cache_status() != "downloaded":
-                    lock = FolderLock(Path(f"{core.files_root}.lock"))
-                    if owner := lock.acquire():
-                        fail(
-                            f"{core.name} is being downloaded by {owner}",
-                            hint="run the command again after the download",
-                        )
-                    try:
-                        core.setup()
-                    finally:
-                        lock.release()
+                fetch(core)
 
     def _cores(self, build: Build) -> list[tuple[Any, Mapping[str, Any]]]:
         fusesoc = self.solver or self.fusesoc
@@ -154,14 +144,7 @@ def _solver(options: RunOptions, build_root: Path | None) -> Any:
     if not options.mappings and not options.lock_file:
         return None
     fusesoc = _fusesoc(options, build_root)
-    try:
-        fusesoc.cm.db.mapping_set(options.mappings)
-        if options.lock_file:
-            if not options.lock_file.is_file():
-                fail(f"there is no lock file {options.lock_file}")
-            fusesoc.cm.db.load_lockfile(options.lock_file, disable_store=True)
-    except (RuntimeError, SyntaxError) as error:
-        fail(str(error))
+    options.apply(fusesoc)
     return fusesoc
 
 

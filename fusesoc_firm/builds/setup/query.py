@@ -61,18 +61,19 @@ class Cores:
 
     def deps(self, patterns: Sequence[str]) -> Answer:
         """Return the selected cores and all cores on which they depend. May raise `InputError`."""
-        return self._answer(_reached(self._named(patterns), self.needs))
+        return self.among(_reached(self.named(patterns), self.needs))
 
     def rdeps(self, patterns: Sequence[str]) -> Answer:
         """Return the selected cores and all cores that depend on them. May raise `InputError`."""
-        return self._answer(_reached(self._named(patterns), self._needed_by()))
+        return self.among(_reached(self.named(patterns), self._needed_by()))
 
     def allpaths(self, start: str, end: str) -> Answer:
         """Return the cores on all paths of dependencies between two selections. May raise `InputError`."""
-        below = _reached(self._named([start]), self.needs)
-        return self._answer(below & _reached(self._named([end]), self._needed_by()))
+        below = _reached(self.named([start]), self.needs)
+        return self.among(below & _reached(self.named([end]), self._needed_by()))
 
-    def _named(self, patterns: Iterable[str]) -> list[str]:
+    def named(self, patterns: Iterable[str]) -> list[str]:
+        """Return the cores that match the patterns. May raise `InputError`."""
         return [
             name
             for pattern in patterns
@@ -82,7 +83,8 @@ class Cores:
     def _needed_by(self) -> dict[str, tuple[str, ...]]:
         return {name: tuple(other for other, needs in self.needs.items() if name in needs) for name in self.needs}
 
-    def _answer(self, names: Iterable[str]) -> Answer:
+    def among(self, names: Iterable[str]) -> Answer:
+        """Return these cores, and the dependencies between them."""
         found = sorted(names)
         edges = ((name, other) for name in found for other in self.needs[name] if other in found)
         rows = ((name, "missing" if name in self.missing else "") for name in found)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.text.diagnostics import fail
+
 BACKEND = "--"
 """Separates the options of `fusesoc run` from the arguments for the backend, which follow the core's name there."""
 
@@ -36,6 +38,17 @@ class RunOptions:
         """Return the flags that FuseSoC derives from these options."""
         flags: dict[str, bool | str] = {"tool": self.tool} if self.tool else {}
         return flags | {flag.lstrip("+-"): not flag.startswith("-") for flag in self.flags}
+
+    def apply(self, fusesoc: Any) -> None:
+        """Let mappings and lock file apply to a FuseSoC instance, which is possible once. May raise `InputError`."""
+        try:
+            fusesoc.cm.db.mapping_set(self.mappings)
+            if self.lock_file:
+                if not self.lock_file.is_file():
+                    fail(f"there is no lock file {self.lock_file}")
+                fusesoc.cm.db.load_lockfile(self.lock_file, disable_store=True)
+        except (RuntimeError, SyntaxError) as error:
+            fail(str(error))
 
     def configure(self, config: Any) -> None:
         """Set the options that FuseSoC keeps in its configuration, where the builds of this process find them."""

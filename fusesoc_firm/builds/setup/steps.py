@@ -34,6 +34,7 @@ CACHED, RAN, FAILED = "cached", "ran", "failed"
 _EDAM = ".eda.yml"
 _RERUN = "--rerun"
 _NOT_STORED = "the last run failed, or its result is not stored"
+_NOT_EXPORTED = "with --no-export, its inputs are not in the folder of the build"
 _BACKEND = ("-m", "fusesoc_firm.builds.step.backend")
 
 
@@ -73,6 +74,7 @@ class Steps:
         if fusesoc.config.no_export:
             # The sources are not in the build's folder, so no step could be cached; the command line refuses a sandbox.
             run_unstored(fusesoc, build, options, dict(self.flags), is_build_only="run" not in self.names)
+            write_report(build, [Step(name, RAN, 0, _NOT_EXPORTED) for name in self.names])
             return
         results = default_results()
         contents = results.contents()

@@ -234,6 +234,36 @@ def test_a_fault_in_a_parameter_is_shown_in_the_core(
     assert f"{line:5d} | {core.read_text().splitlines()[line - 1]}\n" in error
 
 
+@pytest.mark.parametrize(
+    ("override", "place", "message"),
+    [
+        ({"width": 9}, "width: 9", "parameter 'width' is 9, but must be one of 8, 16"),
+        ({"widht": 8}, "widht: 8", "unknown parameter 'widht'"),
+        ({"paths": [1]}, "paths: [1]", "parameter 'paths' is [1], but must be a list of strings"),
+    ],
+)
+def test_a_fault_in_a_targets_override_is_shown_there(
+    bench: Bench, capsys: pytest.CaptureFixture[str], override: dict[str, object], place: str, message: str
+) -> None:
+    assert bench.run(spec="spec.yaml", width=16, paths=["a"]) == 0
+    core = bench.project / "arm.core"
+    text = "targets:\n  one: {generate: [system]}\n  two: {generate: [other, {system: {width: 8, seed: 2}}]}\n"
+    text += f"  three: {{generate: [system: {{{place}}}]}}\n"
+    core.write_text(core.read_text().partition("targets:")[0] + text)
+    call = yaml.safe_load((bench.work / "system_input.yml").read_text())
+    call["parameters"] |= override
+    (bench.work / "system_input.yml").write_text(yaml.safe_dump(call))
+    known = (
+        Parameter("spec", "str", "a path"),
+        Parameter("width", "int", "bits", 8, choices=(8, 16)),
+        Parameter("paths", "list", "folders"),
+    )
+    assert main("echo", ["system_input.yml"], {"echo": Generator(known, bench.echo.load)}) == 1
+    column = text.splitlines()[3].index(place) + (1 if "unknown" in message else len(place.partition(" ")[0]) + 2)
+    line = len(core.read_text().splitlines())
+    assert capsys.readouterr().err.startswith(f"{core}:{line}:{column}: error: {message}")
+
+
 def test_one_parameter_stands_in_for_others(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
     assert bench.run(width=8) == 1
     assert capsys.readouterr().err.endswith("      = alternatively, set 'file'\n")

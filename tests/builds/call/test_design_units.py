@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from fusesoc_firm.builds.call.fusesoc_run import _units_of
 from fusesoc_firm.tools.library_path import library_root
@@ -117,6 +118,12 @@ def test_what_is_legal_is_accepted_whatever_earlier_runs_left(project: Project) 
     project.accept()
     project.write("ros: 2, width: 64, name: right", "ros: 1, width: 16, name: right")
     project.refuse()
+    # Each library has its own units.
+    project.write("ros: 2, width: 64, logical_name: left_ip", "ros: 1, width: 16, logical_name: right_ip")
+    project.accept()
+    (edam,) = (project.root.parent / "build").rglob("*.eda.yml")
+    libraries = {item.get("logical_name") for item in yaml.safe_load(edam.read_text())["files"]}
+    assert {"left_ip", "right_ip", "firm"} <= libraries
     names = {path.name for path in (project.root.parent / "build").rglob("src/*right-pose*/*.vhd")}
     assert names >= {
         "right_axis_to_geometry_msgs_point.vhd",
@@ -129,3 +136,4 @@ def test_units_are_found_as_tools_see_them() -> None:
     vhdl = b"-- entity no is\nENTITY Yes IS\nend;\npackage body p is\npackage p is\r\nu: entity work.other\n"
     files = {"a.vhd": vhdl, "b.v": b"module m (\n// module n\n", "c.txt": b"entity text is"}
     assert set(_units_of(files)) == {"yes", "p", "m"}
+    assert set(_units_of({**files, "x.core": b"- a.vhd:\n    logical_name: ip\n"})) == {"ip.yes", "ip.p", "ip.m"}
