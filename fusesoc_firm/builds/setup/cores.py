@@ -33,9 +33,10 @@ _NO_OPTIONS = RunOptions()
 class ProjectCore:
     """A core: the name, the files with the `.core` file first, the dependencies, and the generator calls.
 
-    `names` are the names by which other cores can depend on this core, or under a mapping; each consists of vendor,
-    library and name. `files` may be folders, or missing. `needs` are the dependencies as written, such as
-    `>=acme:m:one:1.0`. `fetched` is the folder with the sources of a provider, or None.
+    `names` are the names by which other cores can depend on this core; each consists of vendor, library and name.
+    `files` may be folders, or missing. `needs` are the dependencies as written, such as `>=acme:m:one:1.0`. `fetched`
+    is the folder with the sources of a provider, or None. `replaced` are the names of which the core takes the place
+    if a user selects a mapping.
     """
 
     vlnv: str
@@ -44,6 +45,7 @@ class ProjectCore:
     needs: tuple[str, ...]
     calls: tuple[GeneratorCall, ...]
     fetched: Path | None = None
+    replaced: tuple[str, ...] = ()
 
     @property
     def depends(self) -> frozenset[str]:
@@ -112,7 +114,7 @@ def affected(
     }
     new = set(reasons)
     while new:
-        by_name = {name: core.vlnv for core in cores if core.vlnv in new for name in core.names}
+        by_name = {name: core.vlnv for core in cores if core.vlnv in new for name in (*core.names, *core.replaced)}
         new = set()
         for core in cores:
             if core.vlnv not in reasons and (through := sorted(core.depends & by_name.keys())):
@@ -266,11 +268,12 @@ def _core(found: Any, mapped: Mapping[str, Sequence[str]]) -> ProjectCore:
     ]
     return ProjectCore(
         vlnv,
-        frozenset((*names, *(other for name in names for other in mapped.get(name, ())))),
+        frozenset(names),
         tuple(dict.fromkeys((core.path.resolve(), *files, *scripts, *([fetched] if fetched else ())))),
         tuple(dict.fromkeys(needs)),
         tuple(_calls(vlnv, core, Path(found.files_root))),
         fetched,
+        tuple(other for name in names for other in mapped.get(name, ())),
     )
 
 

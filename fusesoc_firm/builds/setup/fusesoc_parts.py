@@ -67,11 +67,17 @@ class SoundCore(CoreInterface):  # type: ignore[misc]
 
     def export(self, dst_dir: str, flags: Mapping[str, Any] = {}) -> None:
         """Copy the files to the folder of the core in a build. Raise `SyntaxError` for a copy out of the build."""
-        for item in self.get_files(flags):
-            in_build = f"src/{self.name.sanitized_name}/{item['name']}"
-            if not Path(item["name"]).is_absolute() and _leads_out(in_build):
-                raise SyntaxError(f"'{item['name']}' of {self.name} would be copied out of the build folder")
+        names = [item["name"] for item in self.get_files(flags) if not Path(item["name"]).is_absolute()]
+        for name in names:
+            if _leads_out(f"src/{self.name.sanitized_name}/{name}"):
+                raise SyntaxError(f"'{name}' of {self.name} would be copied out of the build folder")
         super().export(dst_dir, flags)
+        # FuseSoC copies a folder, and then removes its content as that of an earlier build.
+        for name in names:
+            for source in (Path(root, name) for root in (self.core_root, self.files_root)):
+                if source.is_dir():
+                    shutil.copytree(source, Path(dst_dir, name), dirs_exist_ok=True)
+                    break
 
 
 def _leads_out(path: str) -> bool:

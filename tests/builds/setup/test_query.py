@@ -70,7 +70,7 @@ def test_paths(capsys: Captured) -> None:
 def test_the_forms_of_an_answer(capsys: Captured) -> None:
     found = json.loads("\n".join(ask(capsys, "allpaths", "top", "left", "--output", "json")))
     names = ["me:p:left:1.0", "me:p:top:1.0"]
-    assert found == {"rows": [{"core": name} for name in names], "edges": [names[::-1]]}
+    assert found == {"rows": [{"core": name, "state": ""} for name in names], "edges": [names[::-1]]}
     picture = ask(capsys, "allpaths", "top", "left", "--output", "dot")
     assert picture[0] == "digraph {"
     assert '  "me:p:top:1.0" -> "me:p:left:1.0"' in picture
