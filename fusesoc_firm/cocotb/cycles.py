@@ -59,7 +59,9 @@ class Cycles:
         for name in ("rst_n", *inputs):
             getattr(self._dut, name).value = 0
         for name in ("clk", *clocks):
-            cocotb.start_soon(_clock(getattr(self._dut, name)).start())
+            # A task in cocotb 2, a coroutine in cocotb 1.
+            clock: Any = _clock(getattr(self._dut, name)).start()
+            cocotb.start_soon(clock)
         for _ in range(_RESET_CYCLES):
             await FallingEdge(self._dut.clk)
         self._dut.rst_n.value = 1
