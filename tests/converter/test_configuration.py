@@ -18,6 +18,7 @@ from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.storing import enables
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
+from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
@@ -245,8 +246,12 @@ def test_widths_without_a_template_are_refused() -> None:
 
 
 def test_a_frame_of_more_bits_than_vhdl_counts_is_refused() -> None:
-    largest = layout(ROS1, "uint8[268435447] a\n")
-    assert publisher_configuration(largest, 8)["all_bits"] == 8 * (2**28 - 1)
+    """Of arrays that are not so long that they are streams."""
+
+    def frame(count: int) -> Frame:
+        return layout(ROS1, f"E[4095] e\nuint8[{count}] b\n", {"p/E": "uint8[65536] a\n"})
+
+    assert publisher_configuration(frame(65_527), 8)["all_bits"] == 8 * (2**28 - 1)
     for configuration in (subscriber_configuration, publisher_configuration):
         with pytest.raises(InputError, match=r"p/M has 268435448 bytes, which is too many for a converter"):
-            configuration(layout(ROS1, "uint8[268435448] a\n"), 8)
+            configuration(frame(65_528), 8)

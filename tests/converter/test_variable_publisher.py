@@ -123,7 +123,7 @@ def test_a_block_that_ends_an_element_ends_it_with_its_last_word() -> None:
 
 def test_a_message_that_is_too_large_is_an_error() -> None:
     with pytest.raises(InputError, match=r"the fields of p/M have .* bytes, which is too many for a converter"):
-        configured(layout(ROS1, "uint8[300000000] a\nstring s\n"))
+        configured(layout(ROS1, "E[4600] e\nstring s\n", {"p/E": "uint8[65536] a\n"}))
 
 
 def test_every_name_of_the_text_is_kept_from_fields() -> None:

@@ -42,6 +42,7 @@ OTHER_FAULTS = {
     ("system/scaffold/core_file.py", "updated_core"): "the file of a core",
     ("system/scaffold/project.py", "create"): "options of the command line",
     ("system/scaffold/project.py", "new_folder"): "options of the command line",
+    ("system/scaffold/project.py", "_check_bench"): "options of the command line",
     ("system/scaffold/project.py", "_check_topics"): "options of the command line",
     ("system/scaffold/example.py", "example_named"): "options of the command line",
     ("system/scaffold/wizard.py", "extend_specification"): "a file that is extended, in test_wizard",
