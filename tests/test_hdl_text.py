@@ -45,6 +45,7 @@ REASONS = {
     "converter/storing.py": {"is_beat": _CONDITION, "_is_used": _CONDITION},
     "converter/variable_publisher.py": {"_count": _OPERAND},
     "runs/verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
+    "netlist/instantiated.py": {"_range": "the range of a port"},
     "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
     "netlist/probed_source.py": {"bit_functions": _OPERAND},
     "netlist/verilog.py": {

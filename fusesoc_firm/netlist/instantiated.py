@@ -18,6 +18,7 @@ from typing import Any
 
 from fusesoc_firm.netlist.model import Module, NetlistError
 from fusesoc_firm.netlist.verilog import identifier
+from fusesoc_firm.text.render import render
 from fusesoc_firm.tools.programs import explanation, find
 from fusesoc_firm.tools.yosys import Yosys, source_place
 
@@ -163,30 +164,23 @@ def module_of(entity: Entity, translated: Mapping[Use, Module]) -> str:
     parameters = {name: item.parameter for name, item in entity.generics.items() if name in names}
     modules = _by_condition(entity, translated, parameters)
     ports = list(_ports(entity, modules))
-    connections = ", ".join(f".{identifier(inner)}({name})" for _, inner, name in ports)
-    branches = [
-        f"if ({condition}) begin : set_{number}\n      {identifier(module.name)} unit ({connections});\n    end else "
+    translations = [
+        {
+            "condition": condition,
+            "number": number,
+            "module": identifier(module.name),
+            "connections": [{"inner": identifier(inner), "outer": port["name"]} for port, inner in ports],
+        }
         for number, (condition, module) in enumerate(modules.items())
     ]
-    lines = [
-        f"module {identifier(entity.name)}",
-        *(
-            ["#(", ",\n".join(f"  parameter {name} = {value}" for name, value in parameters.items()), ")"]
-            if names
-            else []
-        ),
-        "(",
-        ",\n".join(f"  {declaration}{name}" for declaration, _, name in ports),
-        ");",
-        "  generate",
-        f"    {''.join(branches)}begin : others",
-        f"      {entity.name}_is_not_translated_with_these_parameters unit ();",
-        "    end",
-        "  endgenerate",
-        "endmodule",
-        "",
-    ]
-    return "\n".join(lines)
+    context = {
+        "name": identifier(entity.name),
+        "parameters": [{"name": name, "value": value} for name, value in parameters.items()],
+        "ports": [port for port, _ in ports],
+        "translations": translations,
+        "missing": f"{entity.name}_is_not_translated_with_these_parameters",
+    }
+    return render("verilog/entity.v", context)
 
 
 def _by_condition(entity: Entity, translated: Mapping[Use, Module], parameters: Mapping[str, str]) -> dict[str, Module]:
@@ -201,13 +195,13 @@ def _by_condition(entity: Entity, translated: Mapping[Use, Module], parameters: 
     return found
 
 
-def _ports(entity: Entity, modules: Mapping[str, Module]) -> Iterator[tuple[str, str, str]]:
-    """Yield the declaration of each port without its name, its name in the netlist and its name in the source."""
+def _ports(entity: Entity, modules: Mapping[str, Module]) -> Iterator[tuple[dict[str, str], str]]:
+    """Yield each port with the spelling of the source, and its name in the netlist."""
     inputs, outputs = ([item.inputs for item in modules.values()], [item.outputs for item in modules.values()])
     for direction, sides in (("input", inputs), ("output", outputs)):
         for same in zip(*sides, strict=True):
             range_ = _range([port.width for port in same], list(modules))
-            yield f"{direction} {range_}", same[0].name, entity.spelt(same[0].name)
+            yield {"direction": direction, "range": range_, "name": entity.spelt(same[0].name)}, same[0].name
 
 
 def _use(entity: Entity, cell: Mapping[str, Any]) -> Use:

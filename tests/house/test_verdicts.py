@@ -56,13 +56,15 @@ async def check(dut, value):
 
 
 """
+# Without it, the steps of Icarus Verilog are seconds.
+_WIRE_OF = "`timescale 1ns/1ps\nmodule wire_of(input a, output b); assign b = a; endmodule\n"
 WIRE = {
     "ghdl": (
         "wire.vhd",
         "entity wire is port (a : in bit; b : out bit); end; architecture r of wire is begin b <= a; end;",
     ),
-    "icarus": ("wire.v", "module wire_of(input a, output b); assign b = a; endmodule"),
-    "verilator": ("wire.v", "module wire_of(input a, output b); assign b = a; endmodule"),
+    "icarus": ("wire.v", _WIRE_OF),
+    "verilator": ("wire.v", _WIRE_OF),
 }
 VUNIT = {
     "pass": "check(true);",

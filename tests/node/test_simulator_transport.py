@@ -23,7 +23,7 @@ import os, struct, sys, time
 requests, reports = open(3, "rb"), open(4, "wb")
 cycle = quiet = counted = 0
 frames = []
-reports.write(b"V\\4")
+reports.write(b"V\\5")
 def say(*parts):
     reports.write(b"".join(parts))
 while kind := requests.read(1):

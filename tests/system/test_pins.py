@@ -45,7 +45,8 @@ def test_every_block_has_its_own_pins(tmp_path: Path) -> None:
     ]
     for block in found["accelerators"]:
         mapped = {port["formal"]: port["actual"] for port in block["ports"]}
-        assert (mapped["led"], mapped["tid"]) == (f"{block['block']}_led", f"{block['block']}_tid_synced")
+        name = block["label"].removeprefix("u_")
+        assert (mapped["led"], mapped["tid"]) == (f"{name}_led", f"{name}_tid_synced")
 
 
 def test_an_input_may_be_wired_directly(tmp_path: Path) -> None:
@@ -54,7 +55,9 @@ def test_an_input_may_be_wired_directly(tmp_path: Path) -> None:
     ((block,), (synchroniser,)) = found["accelerators"], found["synchronisers"]
     mapped = {port["formal"]: port["actual"] for port in block["ports"]}
     assert (mapped["sclk"], mapped["levels"]) == ("a_sclk", "a_levels_synced")
-    assert (synchroniser["pin"], synchroniser["bits"], synchroniser["clock"]) == ("a_levels", 3, "clk")
+    mapped = {port["formal"]: port["actual"] for port in synchroniser["ports"]}
+    assert mapped == {"clk": "clk", "level": "a_levels", "synced": "a_levels_synced"}
+    assert synchroniser["generics"] == [{"formal": "BITS", "actual": "3"}]
 
 
 @pytest.mark.parametrize("block", ["m_axis", "from", "burst"])

@@ -88,7 +88,7 @@ def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
     if policy in PREEMPTIVE:
         expected["SHORTEST_RUN"] = "4"
     assert generics == expected
-    assert configuration["is_preemptive"] == (policy in PREEMPTIVE)
+    assert found.scheduling.is_preemptive == (policy in PREEMPTIVE)
     constants = (configuration["scheduler_times"] or {"constants": []})["constants"]
     cycles = {item["name"]: [value["cycles"] for value in item["values"]] for item in constants}
     known = {"PERIODS": [500, 90], "DEADLINES": [500, 80], "TRANSFER_TIMES": [29, 30]}

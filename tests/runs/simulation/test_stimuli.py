@@ -275,7 +275,7 @@ def test_faults_of_form_and_of_content_come_together(tmp_path: Path) -> None:
         ("", "error: stimuli.yaml contains no message for point, byte"),
         ("[]", "error: stimuli.yaml contains no message for point, byte"),
         ("point: {x: 0}", "stimuli.yaml:1:1: error: stimuli must be a list, not a mapping"),
-        ("- &x {point: *x}", "stimuli.yaml:1:6: error: 'x' is a"),
+        ("- &x {point: *x}", "stimuli.yaml:1:14: error: invalid YAML: the alias '*x' is inside its own value"),
     ],
 )
 def test_no_list_of_messages(tmp_path: Path, text: str, message: str) -> None:
