@@ -133,7 +133,7 @@ class ActionSimulator(model_simulator.Simulator):
             return report
         number = number_of(self.version, frame[5:])
         if number == Goal.REFUSED:
-            return report + b"E\0\0" + now.to_bytes(8, "little")
+            return report + b"E\0\0\1" + now.to_bytes(8, "little")
         if number == Goal.SILENT:
             return report
         if number == Goal.GATED:

@@ -62,7 +62,7 @@ class ServiceSimulator(model_simulator.Simulator):
         report = b"T" + (now - self.beats(frame) + 1).to_bytes(8, "little") + now.to_bytes(8, "little")
         cycle = now.to_bytes(8, "little")
         if word == "refused":
-            report += b"E\0\0" + cycle
+            report += b"E\0\0\1" + cycle
         if word != "silent":
             report += b"B\0\0\1" + cycle + cycle + (8).to_bytes(4, "little") + reply[:8]
         return report
