@@ -53,7 +53,7 @@ class VerilogReader:
         modules = {_name(name, module): module for name, module in self.yosys.modules(interfaces).items()}
         parameters = modules.get(top, {}).get("parameter_default_values", {})
         given = " ".join(f"-chparam {name} {value}" for name, value in generics.items() if name in parameters)
-        elaborated = f"{self.yosys.reading(paths, '-nosynthesis', '-defer')}; hierarchy -top {top} {given}"
+        elaborated = f"{self.yosys.reading(paths, '-nosynthesis', '-defer')}; hierarchy -top {top} {given}; proc"
         self.instances.compare(self.yosys.modules(elaborated), paths, faults)
         if given:
             sized = self.yosys.modules(f"{interfaces}; hierarchy -top {top} {given}")

@@ -132,15 +132,17 @@ class Instantiated:
 
         Raise `NetlistError` for an instance that is not legal for its entity.
         """
-        if not self.entities:
+        files = self._files(root)
+        if not any(name in self.entities for path in files for name in _WORDS.findall(_text(str(path)))):
             return
         if not (program := find("yosys")):
             raise NetlistError(f"{explanation(['yosys'])}\n      = it finds {', '.join(self.entities)} in the Verilog")
         self.folder.mkdir(parents=True, exist_ok=True)
         yosys = Yosys(program, self.folder, self.defines)
-        reading = yosys.reading(self._files(root), "-nosynthesis", "-defer")
+        reading = yosys.reading(files, "-nosynthesis", "-defer")
         values = "".join(f" -chparam {name} {value}" for name, value in parameters.items())
-        script = f"{reading}; hierarchy -top {root}{values}"
+        # Yosys writes no JSON of processes.
+        script = f"{reading}; hierarchy -top {root}{values}; proc"
         if not (modules := yosys.modules(script)):
             raise NetlistError(f"error: Yosys cannot read the Verilog:\n{yosys.run(script).stderr.strip()}")
         for cell in (cell for module in modules.values() for cell in module["cells"].values()):

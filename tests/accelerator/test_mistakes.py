@@ -155,7 +155,12 @@ VERILOG = [
     ("endmodule", "", "", "syntax error"),
     # latches
     (_ZERO, "reg [31:0] r; always @* if (clk) r = in_step; assign out_data = r;", "always", "latch inferred for 'r'"),
-    (_ZERO, "unknown u (.i(in_step), .o(out_data));", "unknown", "there is no module 'unknown' in the sources and"),
+    (
+        _ZERO,
+        "unknown u (.i(in_step), .o(out_data)); reg r; always @(posedge clk) r <= rst_n;",
+        "unknown",
+        "there is no module 'unknown' in the sources and",
+    ),
     # sources of signals
     (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
     ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),

@@ -56,8 +56,9 @@ def test_each_set_of_parameters_is_translated(tmp_path: Path) -> None:
     (tmp_path / "step.vhd").write_text(STEP)
     inner = tmp_path / "inner.v"
     inner.write_text(
-        "module inner #(parameter WIDTH = 6) (input [WIDTH-1:0] a, output [WIDTH:0] s);\n"
-        "  step #(.BITS(WIDTH), .FACTOR(-3)) u (.A(a), .sum(s));\nendmodule\n"
+        "module inner #(parameter WIDTH = 6) (input [WIDTH-1:0] a, output reg [WIDTH:0] s);\n"
+        "  step #(.BITS(WIDTH), .FACTOR(-3)) u (.A(a), .sum(t));\n  wire [WIDTH:0] t;\n"
+        "  always @(t) s = t;\nendmodule\n"
     )
     top = tmp_path / "top.v"
     top.write_text(
