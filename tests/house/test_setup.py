@@ -143,6 +143,7 @@ def test_make_without_a_target_lists_them() -> None:
         "ci",
         "docs",
         "studio",
+        "kilted",
         "corpus",
         "bench",
         "bitstream",
