@@ -19,6 +19,8 @@ MOST_FIELDS = 4096
 MOST_CONSTANTS = 4096
 MOST_NODES = 16384
 MOST_BYTES = 65536
+MOST_STREAMED_BYTES = 2**31 - 1
+"""The size limit in bytes of an array of fixed size that is a stream: integers in VHDL count its bytes."""
 MOST_FILE_BYTES = 2**18
 """The size limit in bytes of a `.msg`, `.srv` or `.action` file."""
 
@@ -64,7 +66,7 @@ def is_streamed(type_: ArrayType, rules: WireRules) -> bool:
     element = type_.element
     if not isinstance(element, PrimitiveType) or element.name not in rules.scalars:
         return False
-    return rules.scalars[element.name].size * type_.length > MOST_BYTES
+    return MOST_BYTES < rules.scalars[element.name].size * type_.length <= MOST_STREAMED_BYTES
 
 
 def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
