@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -111,21 +112,17 @@ def entities(libraries: Mapping[str, Sequence[str]]) -> dict[str, Entity]:
 
 @dataclass(frozen=True)
 class Instantiated:
-    """The entities that the Verilog files of a build name; Yosys' output is in `folder`."""
+    """What the Verilog files of a build instantiate of these entities; Yosys' output is in `folder`."""
 
     entities: Mapping[str, Entity]
     verilog: Sequence[str]
     defines: Mapping[str, str]
     folder: Path
 
-    @classmethod
-    def of(
-        cls, libraries: Mapping[str, Sequence[str]], verilog: Sequence[str], defines: Mapping[str, str], folder: Path
-    ) -> Instantiated:
-        """Return those of the entities in `libraries` whose names occur in the Verilog files."""
-        words = {word for file in verilog for word in _WORDS.findall(_text(file))}
-        known = entities(libraries) if words else {}
-        return cls({name: entity for name, entity in known.items() if name in words}, verilog, defines, folder)
+    @cached_property
+    def _words(self) -> Mapping[str, set[str]]:
+        """The words of each file, its comments included."""
+        return {file: set(_WORDS.findall(_text(file))) for file in self.verilog}
 
     def below(self, root: str, parameters: Mapping[str, str]) -> Iterator[Use]:
         """Yield the instances of entities below a module with these parameters.
@@ -133,13 +130,13 @@ class Instantiated:
         Raise `NetlistError` for an instance that is not legal for its entity.
         """
         files = self._files(root)
-        if not any(name in self.entities for path in files for name in _WORDS.findall(_text(str(path)))):
+        if not (named := sorted(set().union(*(self._words[file] for file in files)) & self.entities.keys())):
             return
         if not (program := find("yosys")):
-            raise NetlistError(f"{explanation(['yosys'])}\n      = it finds {', '.join(self.entities)} in the Verilog")
+            raise NetlistError(f"{explanation(['yosys'])}\n      = it finds {', '.join(named)} in the Verilog")
         self.folder.mkdir(parents=True, exist_ok=True)
         yosys = Yosys(program, self.folder, self.defines)
-        reading = yosys.reading(files, "-nosynthesis", "-defer")
+        reading = yosys.reading([Path(file) for file in files], "-nosynthesis", "-defer")
         values = "".join(f" -chparam {name} {value}" for name, value in parameters.items())
         # Yosys writes no JSON of processes.
         script = f"{reading}; hierarchy -top {root}{values}; proc"
@@ -149,15 +146,15 @@ class Instantiated:
             if (entity := self.entities.get(cell["type"])) and cell["type"] not in modules:
                 yield _use(entity, cell)
 
-    def _files(self, root: str) -> list[Path]:
+    def _files(self, root: str) -> list[str]:
         """Return the files below a module, in the order of the build: Yosys need not read test benches."""
-        words = {file: set(_WORDS.findall(_text(file))) for file in self.verilog}
-        units = {name: file for file in self.verilog for name in _UNIT.findall(_text(file))}
+        defined = {file: _UNIT.findall(_text(file)) for file in self.verilog}
+        units = {name: file for file, names in defined.items() for name in names}
         needed, new = set(), {units[root]} if root in units else set(self.verilog)
         while new:
             needed |= new
-            new = {units[name] for file in new for name in words[file] & units.keys()} - needed
-        return [Path(file) for file in self.verilog if file in needed or not _UNIT.search(_text(file))]
+            new = {units[name] for file in new for name in self._words[file] & units.keys()} - needed
+        return [file for file, names in defined.items() if file in needed or not names]
 
 
 def module_of(entity: Entity, translated: Mapping[Use, Module]) -> str:

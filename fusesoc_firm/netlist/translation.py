@@ -121,12 +121,6 @@ class Translation:
         return replace(self, top=f"{use.entity.library}.{use.entity.name}", generics=dict(use.generics))
 
     @property
-    def is_verilog(self) -> bool:
-        """Whether the top unit is a module in Verilog, and no unit in VHDL."""
-        names = {name.lower() for name in entities(self.libraries)} if _module(self.top, self.verilog) else ()
-        return bool(names) and self.unit.lower() not in names
-
-    @property
     def unit(self) -> str:
         """The top unit, without its library."""
         return self.top.rpartition(".")[2]
@@ -163,11 +157,13 @@ def _whole(translation: Translation, folder: Path) -> tuple[str, str]:
 
     If the top unit is a module in Verilog, only the entities are translated.
     """
-    found = Instantiated.of(translation.libraries, translation.verilog, translation.defines, folder / "verilog")
+    known = entities(translation.libraries) if translation.verilog else {}
+    found = Instantiated(known, translation.verilog, translation.defines, folder / "verilog")
     texts: dict[str, str] = {}
     warnings: list[str] = []
     roots: list[tuple[str, Mapping[str, str]]] = []
-    if translation.is_verilog:
+    is_vhdl = translation.unit.lower() in {name.lower() for name in known}
+    if known and not is_vhdl and _module(translation.top, translation.verilog):
         roots.append((translation.top, {}))
     else:
         first = _translated(translation, folder)
