@@ -167,7 +167,7 @@ def _whole(translation: Translation, folder: Path) -> tuple[str, str]:
         roots.append((translation.top, {}))
     else:
         first = _translated(translation, folder)
-        texts, roots, warnings = first.text(), first.components, [first.warnings]
+        texts, roots, warnings = dict(first.texts), first.components, [first.warnings]
     translated: dict[Use, Module] = {}
     while roots:
         uses = dict.fromkeys(use for root in roots for use in found.below(*root))
@@ -176,10 +176,9 @@ def _whole(translation: Translation, folder: Path) -> tuple[str, str]:
             # A module of the netlist has the name of its entity if that has no generics.
             if use in translated or (not use.generics and use.entity.name in texts):
                 continue
-            part = _translated(translation.of(use), folder)
-            part.rename(f"{use.entity.name}__{len(translated)}", texts)
+            part = _translated(translation.of(use), folder, f"{use.entity.name}__{len(translated)}", texts)
             translated[use] = part.top
-            texts |= part.text()
+            texts |= part.texts
             roots += part.components
             warnings.append(part.warnings)
     for entity in dict.fromkeys(use.entity for use in translated):
@@ -190,15 +189,22 @@ def _whole(translation: Translation, folder: Path) -> tuple[str, str]:
     return "\n".join(texts.values()), "\n".join(dict.fromkeys(filter(None, warnings)))
 
 
-def _translated(translation: Translation, folder: Path) -> _Part:
-    """Return the netlist of the top unit; if GHDL cannot infer its memories, all of them are registers."""
+def _translated(translation: Translation, folder: Path, top: str = "", taken: Container[str] = ()) -> _Part:
+    """Return the netlist of the top unit; if GHDL cannot infer its memories, all of them are registers.
+
+    `top` is another name for the top unit. Each other module whose name is `taken` gets one that begins with it.
+    """
+
+    def made(ghdl: _Ghdl) -> _Part:
+        return _netlist(ghdl, top, taken)
+
     try:
-        return _padded(_netlist, translation, folder)
+        return _padded(made, translation, folder)
     except LostMemoryError as error:
         if _NO_MEMORIES in translation.options:
             raise
         registers = replace(translation, options=[*translation.options, _NO_MEMORIES])
-        part = _padded(_netlist, registers, folder)
+        part = _padded(made, registers, folder)
         warning = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}"
         return replace(part, warnings=f"{warning}\n{part.warnings}")
 
@@ -240,9 +246,10 @@ def _analysed(translation: Translation, folder: Path, padding: Padding) -> _Ghdl
 
 @dataclass(frozen=True)
 class _Part:
-    """The netlist of a unit, with the generics of its components and GHDL's relevant warnings."""
+    """The netlist of a unit: its modules, their Verilog by name, the components' generics, and relevant warnings."""
 
     modules: Modules
+    texts: Mapping[str, str]
     generics: Mapping[tuple[str, str], Mapping[str, str]]
     warnings: str
 
@@ -262,19 +269,9 @@ class _Part:
                     found += [root] if root not in found else []
         return found
 
-    def rename(self, top: str, taken: Container[str]) -> None:
-        """Give the top unit another name, and one that begins with it to each module whose name is taken."""
-        for module in self.modules.values():
-            if module.is_defined and (module is self.top or module.name in taken):
-                module.name = top if module is self.top else f"{top}__{module.name}"
 
-    def text(self) -> dict[str, str]:
-        """Return the Verilog of each module, by its name."""
-        return verilog.write(self.modules, self.generics)
-
-
-def _netlist(ghdl: _Ghdl) -> _Part:
-    """Return the netlist of the top unit."""
+def _netlist(ghdl: _Ghdl, top: str, taken: Container[str]) -> _Part:
+    """Return the netlist of the top unit, named as in `_translated`."""
     text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
@@ -291,7 +288,20 @@ def _netlist(ghdl: _Ghdl) -> _Part:
     if ghdl2.is_at_hand():
         found += [ghdl.check_constants(modules), *doubts(modules)]
     correct(modules)
-    return _Part(modules, generics, "\n".join(filter(None, found)))
+    if top:
+        renamed = _rename(modules, top, taken)
+        generics = {(renamed.get(module, module), instance): values for (module, instance), values in generics.items()}
+    return _Part(modules, verilog.write(modules, generics), generics, "\n".join(filter(None, found)))
+
+
+def _rename(modules: Modules, top: str, taken: Container[str]) -> dict[str, str]:
+    """Rename the modules, and return the new names by the old ones."""
+    renamed: dict[str, str] = {}
+    for module in modules.values():
+        if module.is_defined:
+            new = f"{top}__{module.name}" if module.name in taken else module.name
+            renamed[module.name] = module.name = new if renamed else top
+    return renamed
 
 
 @dataclass(frozen=True)

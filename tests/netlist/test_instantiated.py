@@ -126,6 +126,37 @@ def test_vhdl_and_verilog_contain_each_other(tmp_path: Path) -> None:
     assert compile_verilog("bench", [made, inner, bench], tmp_path).run(tmp_path).output == "33 27\n"
 
 
+def test_an_entity_below_verilog_keeps_the_generics_of_what_is_below_it(tmp_path: Path) -> None:
+    """A module in Verilog, an entity, a module with a parameter, and an entity again."""
+    (tmp_path / "step.vhd").write_text(STEP)
+    (tmp_path / "middle.vhd").write_text(
+        "library ieee;\nuse ieee.std_logic_1164.all;\n"
+        "entity middle is generic (BY : integer := 2);\n"
+        "port (a : in std_logic_vector(7 downto 0); q : out std_logic_vector(8 downto 0)); end;\n"
+        "architecture rtl of middle is\n"
+        "  component inner is\n    generic (FACTOR : integer);\n"
+        "    port (a : in std_logic_vector(7 downto 0); q : out std_logic_vector(8 downto 0));\n  end component;\n"
+        "begin\n  u : inner generic map (FACTOR => BY + 1) port map (a => a, q => q);\nend architecture;\n"
+    )
+    inner = tmp_path / "inner.v"
+    inner.write_text(
+        "module inner #(parameter FACTOR = 1) (input [7:0] a, output [8:0] q);\n"
+        "  step #(.BITS(8), .FACTOR(FACTOR)) u (.A(a), .sum(q));\nendmodule\n"
+    )
+    top = tmp_path / "top.v"
+    top.write_text(
+        "module top (input [7:0] a, output [8:0] q, output [8:0] r);\n"
+        "  middle #(.BY(6)) u (.a(a), .q(q));\n  middle #(.BY(9)) v (.a(a), .q(r));\nendmodule\n"
+    )
+    made = netlist("top", tmp_path, [tmp_path / "step.vhd", tmp_path / "middle.vhd"], verilog=[inner, top])
+    bench = tmp_path / "bench.v"
+    bench.write_text(
+        "module bench; wire [8:0] q, r; top o (.a(8'd20), .q(q), .r(r));\n"
+        'initial #1 $display("%0d %0d", q, r); endmodule'
+    )
+    assert compile_verilog("bench", [made, inner, top, bench], tmp_path).run(tmp_path).output == "30 33\n"
+
+
 def test_results_in_verilog_are_those_of_ieee_754(tmp_path: Path) -> None:
     """Products and comparisons of float32 and float64 in one module."""
     print(f"operands from seed {SEED}")

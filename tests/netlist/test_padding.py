@@ -10,7 +10,7 @@ import pytest
 
 from fusesoc_firm.netlist.model import NetlistError
 from fusesoc_firm.netlist.padding import Padding
-from fusesoc_firm.netlist.translation import Translation, _netlist, _padded
+from fusesoc_firm.netlist.translation import Translation, translate
 
 # Each of its declarations contains a word that could be taken for the start of the statements.
 AWKWARD = """\
@@ -73,7 +73,7 @@ def test_errors_are_where_the_author_sees_them(tmp_path: Path, monkeypatch: pyte
         f"architecture rtl of top is\n{numbers}\tbegin y <= unknown; end;\n"
     )
     with pytest.raises(NetlistError) as raised:
-        _padded(_netlist, Translation("top", "top.v", {"work": [str(file)]}, {}), tmp_path / "ghdl")
+        translate(Translation("top", str(tmp_path / "top.v"), {"work": [str(file)]}, {}), tmp_path / "ghdl")
     line, mark = str(raised.value).splitlines()[-2:]
     assert re.match(rf"{re.escape(str(file))}:{5 if numbers else 4}:20:", str(raised.value).splitlines()[-3])
     assert "padding" not in str(raised.value)
