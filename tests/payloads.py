@@ -27,7 +27,8 @@ from fusesoc_firm.message.middleware import Middleware
 _STORES = {ROS1: Stores.ROS1_NOETIC, ROS2: Stores.ROS2_JAZZY}
 _ENCODING = b"\x00\x01"
 _PREFIX_BYTES = 4
-_LONGEST_TAIL = {ROS1: 0, ROS2: 3}
+# After a message of fixed size, a converter accepts padding only.
+_PADDING = {ROS1: 0, ROS2: 3}
 _LONGEST_ARRAY = 6
 _COUNT_BYTES = 4
 # rosbags names both halves of ROS 1's time as ROS 2 does.
@@ -57,7 +58,27 @@ class Payloads:
 
     def shown(self, payload: bytes) -> dict[str, bytes]:
         """Return each port's values for a payload, elements in sequence; raises `BrokenPayloadError`."""
+        shown, tail = self.with_tail(payload)
+        if tail and (tail > _PADDING[self.ros] if self._is_fixed(self._name) else self.ros is ROS1):
+            raise BrokenPayloadError("bytes behind the last field")
+        return shown
+
+    def with_tail(self, payload: bytes) -> tuple[dict[str, bytes], int]:
+        """Return what `shown` does, and the number of bytes behind the last field, which may be any."""
         return _Reader(self.ros, self._store, payload).shown(self._name)
+
+    def _is_fixed(self, name: str) -> bool:
+        return all(self._is_fixed_kind(kind) for _, kind in self._store.fielddefs[name][1])
+
+    def _is_fixed_kind(self, kind: Any) -> bool:
+        match kind:
+            case (Nodetype.NAME, name):
+                return self._is_fixed(name)
+            case (Nodetype.ARRAY, (inner, _)):
+                return self._is_fixed_kind(inner)
+            case (Nodetype.BASE, (name, _)):
+                return bool(name != "string")
+        return False
 
     def _drawn_message(self, name: str, source: random.Random, given: Mapping[str, Any], path: str) -> Any:
         values = {
@@ -96,13 +117,11 @@ class _Reader:
         self._place = 0
         self._shown: dict[str, bytearray] = defaultdict(bytearray)
 
-    def shown(self, name: str) -> dict[str, bytes]:
+    def shown(self, name: str) -> tuple[dict[str, bytes], int]:
         if self._ros is ROS2 and self._take(_PREFIX_BYTES)[:2] != _ENCODING:
             raise BrokenPayloadError("encoding")
         self._message(name, "")
-        if len(self._payload) - self._place > _LONGEST_TAIL[self._ros]:
-            raise BrokenPayloadError("bytes behind the last field")
-        return {port: bytes(data) for port, data in self._shown.items()}
+        return {port: bytes(data) for port, data in self._shown.items()}, len(self._payload) - self._place
 
     def _message(self, name: str, path: str) -> None:
         for field, kind in self._store.fielddefs[name][1]:

@@ -19,6 +19,7 @@ from functools import cache
 from itertools import count
 from pathlib import Path
 
+from fusesoc_firm.converter.limits import LONGEST_TAIL
 from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.system.derived.ids import ONE_BYTE, TWO_BYTES
 from fusesoc_firm.text.render import render
@@ -286,9 +287,13 @@ def _beat_trouble(system: System, size: int, source: random.Random) -> tuple[Tro
 
 
 def _message(system: System, id_: int, source: random.Random) -> FuzzFrame:
-    name = system.messages[id_]
-    body = trouble(source.choice(_drawn(system.middleware, name)), source)
-    return fuzz_frame(_payloads(system.middleware, name), body)
+    """A frame of a message that comes back, with no more bytes behind the message than a publisher replaces."""
+    payloads = _payloads(system.middleware, system.messages[id_])
+    while True:
+        body = trouble(source.choice(_drawn(system.middleware, system.messages[id_])), source)
+        frame = fuzz_frame(payloads, body)
+        if frame.shown is None or payloads.with_tail(body[LENGTH_BYTES:])[1] <= LONGEST_TAIL:
+            return frame
 
 
 def _number(system: System, source: random.Random) -> FuzzFrame:
