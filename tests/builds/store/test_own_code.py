@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -73,8 +74,8 @@ def test_what_is_old_is_not_read_for_its_state(tmp_path: Path, monkeypatch: pyte
     path = aged(tmp_path)
     state(tmp_path)
     assert read == [str(path)]
-    # As if this process had started an hour later.
-    monkeypatch.setattr(own_code, "_STARTED", own_code._STARTED + 3600 * 10**9)
+    # As if this process started in an hour.
+    monkeypatch.setattr(own_code, "_STARTED", time.time_ns() + 3600 * 10**9)
     state(tmp_path)
     assert read == [str(path)]
 
@@ -88,6 +89,8 @@ def test_a_process_that_watches_looks_again_after_it_has_opened_a_file(
     monkeypatch.setattr(own_code, "PACKAGE", package)
     monkeypatch.setattr(own_code, "_BELOW", f"{package}{os.sep}")
     monkeypatch.setattr(own_code, "_watch", own_code._Watch())
+    # Another test of this process may have kept the state.
+    monkeypatch.setattr(own_code, "_kept", [])
     own_code.watch()
     before = state(package)
     edited = tmp_path / "edited.py"
