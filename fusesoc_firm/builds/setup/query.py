@@ -6,7 +6,7 @@ An answer is a table, with edges for a picture. Dependencies include those of al
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -53,11 +53,13 @@ class Answer:
 class Cores:
     """All cores by their full names, with the cores on which each depends directly.
 
-    A dependency that no core satisfies is in `missing`, as written.
+    A dependency that no core satisfies is in `missing`, as written. Cores that need one, directly or not, are in
+    `lacking`.
     """
 
     needs: Mapping[str, tuple[str, ...]]
     missing: frozenset[str] = frozenset()
+    lacking: frozenset[str] = frozenset()
 
     def deps(self, patterns: Sequence[str]) -> Answer:
         """Return the selected cores and all cores on which they depend. May raise `InputError`."""
@@ -87,39 +89,76 @@ class Cores:
         """Return these cores, and the dependencies between them."""
         found = sorted(names)
         edges = ((name, other) for name in found for other in self.needs[name] if other in found)
-        rows = ((name, "missing" if name in self.missing else "") for name in found)
+        states = {**dict.fromkeys(self.lacking, "lacks a core"), **dict.fromkeys(self.missing, "missing")}
+        rows = ((name, states.get(name, "")) for name in found)
         return Answer(("core", "state"), tuple(rows), tuple(edges))
 
 
 def core_dependencies(cores: Sequence[ProjectCore]) -> Cores:
     """Return the dependencies between cores.
 
-    As in FuseSoC, the newest version that satisfies a dependency counts. All cores that provide a virtual name count,
-    since the target's flags decide between them.
+    As in FuseSoC, the newest version that satisfies a dependency counts. If this version lacks a core in turn, FuseSoC
+    silently uses the next version unless another target has that dependency, so both count. All cores that provide a
+    virtual name count, since the target's flags decide between them.
     """
     by_name: dict[str, list[str]] = {}
     for core in cores:
         for name in core.names:
             by_name.setdefault(name, []).append(core.vlnv)
+    choices = {
+        core.vlnv: {
+            depend: _satisfying(depend, by_name.get(short(depend), ())) for depend in sorted(core.needs, key=short)
+        }
+        for core in cores
+    }
+    lacking = _lacking(choices)
     needs: dict[str, tuple[str, ...]] = {}
-    missing: set[str] = set()
-    for core in cores:
-        found: list[str] = []
-        for depend in sorted(core.needs, key=short):
-            satisfying = _satisfying(depend, by_name.get(short(depend), ()))
-            missing |= set() if satisfying else {depend}
-            found += satisfying or [depend]
-        needs[core.vlnv] = tuple(dict.fromkeys(found))
-    return Cores({**dict.fromkeys(missing, ()), **needs}, frozenset(missing))
+    for name, depends in choices.items():
+        found = (other for depend, choice in depends.items() for other in choice.used(lacking) or [depend])
+        needs[name] = tuple(dict.fromkeys(found))
+    missing = dict.fromkeys(depend for depends in choices.values() for depend, choice in depends.items() if not choice)
+    return Cores({**dict.fromkeys(missing, ()), **needs}, frozenset(missing), frozenset(lacking))
 
 
-def _satisfying(depend: str, providers: Sequence[str]) -> list[str]:
+@dataclass(frozen=True)
+class _Choice:
+    """The cores that satisfy a dependency: the versions, newest first, and those for which it is a virtual name."""
+
+    versions: tuple[str, ...]
+    virtual: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.versions or self.virtual)
+
+    def used(self, lacking: Collection[str]) -> list[str]:
+        """Return the versions down to the first that lacks nothing, and all cores with the virtual name."""
+        last = next((place for place, name in enumerate(self.versions) if name not in lacking), len(self.versions))
+        return [*self.versions[: last + 1], *self.virtual]
+
+
+def _lacking(choices: Mapping[str, Mapping[str, _Choice]]) -> set[str]:
+    """Return the cores with a dependency, direct or not, that no core satisfies."""
+    lacking: set[str] = set()
+    while new := {
+        name
+        for name, depends in choices.items()
+        if name not in lacking
+        and any(lacking.issuperset((*choice.versions, *choice.virtual)) for choice in depends.values())
+    }:
+        lacking |= new
+    return lacking
+
+
+def _satisfying(depend: str, providers: Sequence[str]) -> _Choice:
     own = [name for name in providers if name.rpartition(":")[0] == short(depend)]
+    virtual = tuple(name for name in providers if name not in own)
+    versions: list[str] = []
     try:
-        chosen = newest(depend, own)
+        while chosen := newest(depend, (name for name in own if name not in versions)):
+            versions.append(chosen)
     except SyntaxError:
-        return []
-    return [*([chosen] if chosen else ()), *(name for name in providers if name not in own)]
+        return _Choice((), ())
+    return _Choice(tuple(versions), virtual)
 
 
 def targets(patterns: Sequence[str], kind: str = "*") -> Answer:

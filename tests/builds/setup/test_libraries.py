@@ -182,9 +182,34 @@ def test_what_is_missing_is_shown_among_the_dependencies(capsys: Captured) -> No
     depend("middle", ">=other:lib:absent:2.0")
     assert main(["query", "deps", "me:p:top"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines == [">=other:lib:absent:2.0  missing", "me:p:middle:1.0", "me:p:top:1.0"]
+    assert [line.split(maxsplit=1) for line in lines] == [
+        [">=other:lib:absent:2.0", "missing"],
+        ["me:p:middle:1.0", "lacks a core"],
+        ["me:p:top:1.0", "lacks a core"],
+    ]
     assert main(["query", "rdeps", ">=other:lib:absent:2.0"]) == 0
     assert "me:p:top:1.0" in capsys.readouterr().out
+
+
+def test_an_older_version_counts_if_the_newest_lacks_a_core(capsys: Captured) -> None:
+    """FuseSoC then uses it without a message."""
+    for version, depends in (("1.0", ""), ("2.0", ""), ("3.0", "depend: [me:p:absent], ")):
+        fileset = f"{{files: [tb.vhd], {depends}file_type: vhdlSource}}"
+        targets = "targets: {default: {filesets: [a]}}"
+        add(f"v{version}", f"CAPI=2:\nname: me:p:one:{version}\nfilesets: {{a: {fileset}}}\n{targets}\n")
+    depend("middle", "me:p:one")
+    depend("top", "me:p:middle")
+    assert main(["query", "deps", "me:p:top"]) == 0
+    assert [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()] == [
+        ["me:p:absent", "missing"],
+        ["me:p:middle:1.0"],
+        ["me:p:one:2.0"],
+        ["me:p:one:3.0", "lacks a core"],
+        ["me:p:top:1.0"],
+    ]
+    # As FuseSoC resolves it.
+    assert main(["query", "deps", "me:p:top", "--flag", "any"]) == 0
+    assert capsys.readouterr().out.splitlines() == ["me:p:middle:1.0", "me:p:one:2.0", "me:p:top:1.0"]
 
 
 def test_the_version_of_a_dependency_is_the_one_that_fusesoc_takes(capsys: Captured) -> None:
