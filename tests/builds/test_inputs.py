@@ -419,11 +419,14 @@ def test_random_edits(project: Path, capsys: Captured, count: int) -> None:
         what = f"seed {seed}, edit {edits.number + 1}: {edits.apply()}"
         git("add", ".")
         found = affected(capsys)
+        # Which of two versions of a core a build takes is known to the lock, and not to `affected`.
+        is_exact = not (project / "newer.core").exists()
         for name in TESTS:
             reason = found.get(name, "")
             # The files of the core itself are not locked.
             if not reason or reason.startswith("by "):
-                assert is_locked(capsys, name) == (not reason), f"{what}: {name} {reason}"
+                has_changed = not is_locked(capsys, name)
+                assert has_changed <= bool(reason) <= (has_changed or not is_exact), f"{what}: {name} {reason}"
         results = run_tests(capsys)
         again = {name for name, result in results.items() if result != "cached"}
         ran += len(again)
