@@ -109,7 +109,7 @@ def write_lock(core: str, options: RunOptions = _NO_OPTIONS) -> Path:
 def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """Return the original folders of message cores, since no run of FuseSoC has copied them."""
     found: list[Path] = []
-    cores = {name: core for core in project_cores() for name in core.names}
+    cores = {name: core for core in (project_cores() if named else ()) for name in core.names}
     for name, source in named.items():
         core = cores.get(core_name(name))
         requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []

@@ -1,0 +1,1 @@
+"""Python interface: messages and systems in scripts and notebooks."""
