@@ -123,20 +123,19 @@ def _named(option: str) -> str:
 
 def _copy_example(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.scaffold.example import copy_example, example_named
-    from fusesoc_firm.tools.library_path import demos_root, library_root
+    from fusesoc_firm.tools.library_path import demos_root
 
     if given := [name for name in _DESCRIBING if getattr(arguments, name)]:
         fail(f"an example has no {_named(given[0])}", hint="only NAME can be chosen")
     example = example_named(arguments.example, demos_root())
     folder = Path(arguments.name or example)
-    _print_files(folder, copy_example(example, folder, demos_root(), library_root()))
+    _print_files(folder, copy_example(example, folder, demos_root()))
     print(f"next: cd {folder} && firm sim {example}.yaml")
 
 
 def _start(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.library import libraries
     from fusesoc_firm.system.scaffold.project import LANGUAGES, create, usual_size_of
-    from fusesoc_firm.tools.library_path import library_root
 
     recording = _recording(arguments)
     places = [recording.path] if recording and recording.has_definitions else []
@@ -146,7 +145,7 @@ def _start(arguments: argparse.Namespace) -> None:
     if recording:
         project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))
     folder = Path(project.name)
-    _print_files(folder, create(project, folder, known, library_root(), arguments.path))
+    _print_files(folder, create(project, folder, known, arguments.path))
     source = LANGUAGES[project.language].source.format(project.name)
     print(f"ROS {project.ros}: {project.input} in, {project.output} out")
     if usual := usual_size_of(project, known):

@@ -14,7 +14,6 @@ from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.studio.requests import Requests, body_of, in_json
 from fusesoc_firm.studio.workspace import MOST_NAMES, Workspace, with_words
 from fusesoc_firm.system.scaffold.project import LANGUAGES, Project, create
-from fusesoc_firm.tools.library_path import library_root
 
 _ROS = (2, 1)
 
@@ -53,7 +52,7 @@ class Begin:
 
     def _create(self, project: Project) -> None:
         paths = self._workspace.tools.paths
-        create(project, self._workspace.folder / project.name, self._libraries(), library_root(), paths)
+        create(project, self._workspace.folder / project.name, self._libraries(), paths)
 
     def _libraries(self) -> Libraries:
         tools = self._workspace.tools

@@ -9,7 +9,11 @@ whose folder contains a virtual environment.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+
+LINK = Path(".firm", "library")
+"""The link in a project that leads to the library of the installation in use; `fusesoc.conf` names it."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -27,3 +31,22 @@ def demos_root() -> Path:
 def docs_root() -> Path:
     """Return the absolute path of the documentation's folder."""
     return _PACKAGE / "docs"
+
+
+def link_library(project: Path) -> None:
+    """Let a project's link lead to this installation's library, since its path differs on each machine.
+
+    A copy of the library in place of the link is kept. May raise `OSError`.
+    """
+    link = project / LINK
+    if link.is_symlink() and link.readlink() == library_root():
+        return
+    if link.exists() and not link.is_symlink():
+        return
+    link.parent.mkdir(exist_ok=True)
+    # The link's cores are those of their own library, not of the project's.
+    (link.parent / "FUSESOC_IGNORE").touch()
+    # A process that reads the library meanwhile finds the former link or the new one.
+    made = link.with_name(f"{link.name}-{os.getpid()}")
+    made.symlink_to(library_root())
+    made.replace(link)

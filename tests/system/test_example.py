@@ -8,7 +8,7 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.system.scaffold.example import example_named, examples
-from fusesoc_firm.tools.library_path import demos_root
+from fusesoc_firm.tools.library_path import demos_root, library_root
 
 Captured = pytest.CaptureFixture[str]
 
@@ -27,7 +27,14 @@ def test_a_copy_is_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
     assert {f"{example}.core", f"{example}.yaml", "model.py", "fusesoc.conf", ".gitignore"} <= copied
     assert not any(name.endswith((".md", ".pyc")) for name in copied)
     assert "[library.mine]" in (tmp_path / "mine" / "fusesoc.conf").read_text()
+    assert not has_absolute_path(tmp_path / "mine")
     assert main(["system", "check", f"mine/{example}.yaml"]) == 0
+
+
+def has_absolute_path(project: Path) -> bool:
+    """Whether a file of a project names a folder of this machine."""
+    texts = [path.read_text() for path in project.rglob("*") if path.is_file()]
+    return any(str(place) in text for text in texts for place in (library_root(), project, Path.home()))
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import operator
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,7 @@ from fusesoc_firm.builds.setup.outcome import configuration
 from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.outputs import shown
+from fusesoc_firm.tools.library_path import LINK, link_library
 
 _RELATIONS = {"==": operator.eq, ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 _QUOTED = re.compile(r"'([^']+)'")
@@ -29,7 +31,9 @@ def open_libraries(config: Any = None) -> Any:
     from fusesoc.fusesoc import Fusesoc
 
     _prepare()
-    return Fusesoc(configuration() if config is None else config)
+    config = configuration() if config is None else config
+    _link_library(config)
+    return Fusesoc(config)
 
 
 def main() -> None:
@@ -38,6 +42,16 @@ def main() -> None:
 
     _prepare()
     sys.exit(run())
+
+
+def _link_library(config: Any) -> None:
+    """Renew a project's link to our library, which leads nowhere in a copy from another machine."""
+    places = [Path(library.location) for library in config.libraries]
+    for place in places:
+        if place.parts[-len(LINK.parts) :] == LINK.parts:
+            # FuseSoC reports a link that is missing and cannot be written.
+            with suppress(OSError):
+                link_library(place.parents[len(LINK.parts) - 1])
 
 
 @cache

@@ -37,14 +37,14 @@ def example_named(words: str, demos: Path) -> str:
     return found[0]
 
 
-def copy_example(example: str, folder: Path, demos: Path, library: Path) -> list[Path]:
+def copy_example(example: str, folder: Path, demos: Path) -> list[Path]:
     """Copy a demo system to a new folder as a project, and return its files, relative to `folder`.
 
-    `demos` is the folder of the demo systems, and `library` the folder of the generators. May raise `InputError`.
+    `demos` is the folder of the demo systems. May raise `InputError`.
     """
     with new_folder(folder) as inner:
         shutil.copytree(demos / example, inner, ignore=shutil.ignore_patterns(*_LEFT_OUT), dirs_exist_ok=True)
-        write_surroundings(inner, identifier(folder.name), library)
+        write_surroundings(inner, identifier(folder.name))
     return files_of(folder)
 
 

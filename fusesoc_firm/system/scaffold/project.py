@@ -35,13 +35,14 @@ from fusesoc_firm.text.naming import KEYWORDS, identifier
 from fusesoc_firm.text.outputs import check_parent, write
 from fusesoc_firm.text.prompts import Asker, Question
 from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.tools.library_path import LINK, link_library
 
 _SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
 _ARITHMETIC = "robot:acc:firm_float"
 _STIMULI = "stimuli.yaml"
 # Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
 _BUFFER = 4096
-_IGNORED = "build/*\n!build/FUSESOC_IGNORE\n__pycache__/\n"
+_IGNORED = ".firm/\nbuild/*\n!build/FUSESOC_IGNORE\n__pycache__/\n"
 
 
 @dataclass(frozen=True)
@@ -154,11 +155,11 @@ def _check_topics(taken: str, given: str, recorded: Mapping[str, str]) -> None:
         fail(f"'{taken}' is the topic of both the input and the output", hint="give the message of the output instead")
 
 
-def create(project: Project, folder: Path, known: Libraries, library: Path, paths: Sequence[Path] = ()) -> list[Path]:
+def create(project: Project, folder: Path, known: Libraries, paths: Sequence[Path] = ()) -> list[Path]:
     """Write a new project, and return its files, relative to `folder`.
 
-    `library` is the folder of the generators, and `paths` are further sources of message definitions. May raise
-    `InputError`, such as for a folder that is not empty; nothing is written then.
+    `paths` are further sources of message definitions. May raise `InputError`, such as for a folder that is not empty;
+    nothing is written then.
     """
     if fault := name_fault(project.name):
         fail(fault)
@@ -169,7 +170,7 @@ def create(project: Project, folder: Path, known: Libraries, library: Path, path
         _check_bench(project, paths)
     with new_folder(folder) as inner:
         _write_all(project, inner, known, [os.path.relpath(path, folder) for path in paths])
-        write_surroundings(inner, project.name, library)
+        write_surroundings(inner, project.name)
     return files_of(folder)
 
 
@@ -199,7 +200,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
             yield inner
         except InputError as error:
             raise InputError(_without_places_in(inner, error.diagnostics)) from None
-        shutil.copytree(inner, folder, dirs_exist_ok=True)
+        shutil.copytree(inner, folder, symlinks=True, dirs_exist_ok=True)
 
 
 def _without_places_in(folder: Path, faults: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
@@ -208,9 +209,10 @@ def _without_places_in(folder: Path, faults: Iterable[Diagnostic]) -> Iterator[D
         yield replace(fault, source=None) if is_inside else fault
 
 
-def write_surroundings(folder: Path, name: str, library: Path) -> None:
-    """Write the files that make a folder a FuseSoC library `name`; `library` is the folder of the generators."""
-    write(folder / "fusesoc.conf", render("project/fusesoc.conf", {"name": name, "library": str(library)}))
+def write_surroundings(folder: Path, name: str) -> None:
+    """Write the files that make a folder a FuseSoC library `name`, beside our library."""
+    write(folder / "fusesoc.conf", render("project/fusesoc.conf", {"name": name, "library": str(LINK)}))
+    link_library(folder)
     write(folder / ".gitignore", _IGNORED)
     write(folder / "build" / "FUSESOC_IGNORE", "")
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.builds.setup.libraries import newest
+from fusesoc_firm.builds.setup.libraries import newest, open_libraries
 from fusesoc_firm.cli import main
 from fusesoc_firm.text.outputs import shown
+from fusesoc_firm.tools.library_path import LINK, library_root
 
 GOOD = """\
 CAPI=2:
@@ -248,3 +249,36 @@ def test_builds_without_the_missing_core_run(capsys: Captured) -> None:
         assert "    top.core:4:57: error: unknown core 'other:lib:absent'" in lines
     log = Path(shown(Path("build/me_p_top_1.0/sim.log")))
     assert "unknown core 'other:lib:absent'" in log.read_text()
+
+
+LINKED = "[main]\nignored_dirs = build\n[library.firm]\nlocation = .firm/library\n[library.p]\nlocation = .\n"
+
+
+@pytest.mark.parametrize("former", ["missing", "nowhere", "other"])
+def test_the_link_to_our_library_is_renewed(former: str, tmp_path: Path) -> None:
+    """A project with this link has no path of the machine on which it was written."""
+    Path("fusesoc.conf").write_text(LINKED)
+    (tmp_path / "other").mkdir()
+    if former != "missing":
+        LINK.parent.mkdir()
+        LINK.symlink_to(tmp_path / former)
+    found = {name: item["library"].name for name, item in open_libraries().cm.db._cores.items()}
+    assert LINK.readlink() == library_root()
+    assert {found[name] for name in found if name.startswith("robot:")} == {"firm"}
+    assert {name for name in found if found[name] == "p"} == {"me:p:good:1.0"}
+    assert [path.name for path in LINK.parent.iterdir() if path.name != LINK.name] == ["FUSESOC_IGNORE"]
+
+
+def test_a_copy_of_the_library_is_kept() -> None:
+    """`scp -r` copies what a link leads to."""
+    Path("fusesoc.conf").write_text(LINKED)
+    LINK.mkdir(parents=True)
+    open_libraries()
+    assert not LINK.is_symlink()
+
+
+def test_a_library_that_cannot_be_linked_is_reported_by_fusesoc(caplog: pytest.LogCaptureFixture) -> None:
+    Path("fusesoc.conf").write_text(LINKED)
+    LINK.parent.touch()
+    open_libraries()
+    assert "Failed to register library" in caplog.text

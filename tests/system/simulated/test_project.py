@@ -33,7 +33,7 @@ def made(folder: Path, project: Project) -> Path:
     for name, text in (("Late", LATE), ("Early", EARLY)):
         (package / f"{name}.msg").write_text(text, encoding="utf-8")
     known = libraries([folder / "demo_msgs"], os.environ, None)
-    create(project, folder / project.name, known, Path("/library"), [folder / "demo_msgs"])
+    create(project, folder / project.name, known, [folder / "demo_msgs"])
     return folder / project.name
 
 
