@@ -20,7 +20,7 @@ from typing import Any
 
 from fusesoc_firm.accelerator.user_code import UserFunction, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
-from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.defaults import encode_answer
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import used_part
 from fusesoc_firm.system.derived.model import AcceleratorBlock, End, MessageSide, Software
@@ -177,9 +177,9 @@ def _answer(function: UserFunction, when: str, side: MessageSide, value: object)
         message = f"for {when}, {function.what} returned {value!r}, which is not a mapping of fields"
         function.fail(message, _expected([side]))
     try:
-        return decode(side.frame, encode_used(side.frame, value))
+        return decode(side.frame, encode_answer(side.frame, value))
     except CodecError as error:
-        function.fail(f"for {when}, {function.what} returned an invalid message: {error}")
+        function.fail(f"for {when}, {function.what} returned an invalid message: {error}", word=error.field)
 
 
 def _expected(outputs: Sequence[MessageSide]) -> str:

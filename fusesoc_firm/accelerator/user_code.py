@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
+import inspect
 import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -32,13 +34,29 @@ class UserFunction:
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
             _fail_in(self.path, self.what, error, f" for {when}", self._line())
 
-    def fail(self, message: str, hint: str = "") -> NoReturn:
-        """Raise `InputError` for a fault in the function's result, at the function's line."""
-        fail(message, _place(self.path, self._line()), hint)
+    def fail(self, message: str, hint: str = "", word: str = "") -> NoReturn:
+        """Raise `InputError` for a fault in the function's result.
+
+        The place is that of the key or else the string `word`, if the function has one of them; else the function's
+        only `return` or `yield`; else the function's line.
+        """
+        fail(message, self._result_place(word), hint)
+
+    def _result_place(self, word: str) -> SourceRef:
+        nodes = [*_own_nodes(self.path, self._line())]
+        words = [node for node in nodes if word and isinstance(node, ast.Constant) and node.value == word]
+        keys = {id(key) for node in nodes if isinstance(node, ast.Dict) for key in node.keys}
+        results = [node for node in nodes if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom)]
+        for found in ([item for item in words if id(item) in keys], words, results):
+            if len(found) == 1:
+                return _place_of(self.path, found[0])
+        return _place(self.path, self._line())
 
     def _line(self) -> int:
         """Return the line of the function, or 1 if the file does not define the function."""
-        code = getattr(self.call, "__code__", None)
+        call = inspect.unwrap(self.call)
+        method = call if inspect.isroutine(call) else inspect.getattr_static(type(call), "__call__")
+        code = getattr(method, "__code__", None)
         return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
 
 
@@ -81,6 +99,33 @@ def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: 
     if not frames:
         fail(message, _place(path, otherwise))
     fail(message, _place(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
+
+
+def _own_nodes(path: Path, line: int) -> Iterator[ast.expr | ast.stmt]:
+    """Yield the statements and expressions of the function that begins in a line, without those of inner functions."""
+    functions = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+    for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(function, functions) and _first_line(function) == line:
+            waiting: list[ast.AST] = [function.body] if isinstance(function, ast.Lambda) else [*function.body]
+            while waiting:
+                node = waiting.pop()
+                if isinstance(node, ast.expr | ast.stmt):
+                    yield node
+                waiting += [] if isinstance(node, functions) else ast.iter_child_nodes(node)
+            return
+
+
+def _first_line(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -> int:
+    """Return the line of a function as its code object has it: that of its first decorator."""
+    decorators = [] if isinstance(function, ast.Lambda) else function.decorator_list
+    return min([function.lineno, *(item.lineno for item in decorators)])
+
+
+def _place_of(path: Path, node: ast.expr | ast.stmt) -> SourceRef:
+    place = _place(path, node.lineno)
+    # The parser counts bytes of UTF-8.
+    column = len(place.text.encode()[: node.col_offset].decode()) + 1
+    return replace(place, column=column)
 
 
 def _place(path: Path, line: int, column: int = 1) -> SourceRef:

@@ -39,15 +39,19 @@ def add_init(commands: Any) -> None:
     )
     init.add_argument(
         "--in",
+        "--subscribe",
         dest="input",
         metavar="TYPE|TOPIC",
-        help="the message that is received, or with --from-bag its topic (default: asked)",
+        help="the message that the accelerator receives, such as sensor_msgs/Imu; with --from-bag, a topic of the bag "
+        "(default: asked)",
     )
     init.add_argument(
         "--out",
+        "--publish",
         dest="output",
         metavar="TYPE|TOPIC",
-        help="the message that is sent, or a topic in the bag with this message (default: asked)",
+        help="the message that the accelerator sends; with --from-bag, also a topic of the bag that has this message "
+        "(default: asked)",
     )
     init.add_argument(
         "--include",
@@ -60,7 +64,8 @@ def add_init(commands: Any) -> None:
     init.add_argument(
         "--language",
         choices=("vhdl", "verilog", "hls", "python"),
-        help="the accelerator's language; python runs on the host, behind hardware (default: vhdl)",
+        help="the accelerator's language; hls is C++, which AMD Vitis HLS builds and g++ simulates; python runs on the "
+        "host, behind hardware (default: vhdl)",
     )
     init.add_argument(
         "--width", choices=[str(2**n) for n in range(3, 10)], help="width in bits of the streams (default: 8)"
@@ -151,7 +156,10 @@ def _start(arguments: argparse.Namespace) -> None:
     if usual := usual_size_of(project, known):
         spec = folder / f"{project.name}.yaml"
         print(f"maxLength: messages of up to {usual.bytes} bytes ({usual.example}); change it in {spec}")
-    print(f"edit: {folder / source} (the computation), {folder / 'model.py'} (the responses that it must give)")
+    model = f", {folder / 'model.py'} (the responses that it must give)"
+    print(f"edit: {folder / source} (the computation){'' if project.language == 'python' else model}")
+    if project.language == "hls":
+        print("hardware: AMD Vitis HLS builds the function; 'firm sim' needs only g++ and GHDL")
     print(f"next: cd {folder} && firm sim{' && firm test' if project.has_bench else ''}")
 
 

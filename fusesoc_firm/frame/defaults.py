@@ -59,6 +59,11 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
     return bytes(payload)
 
 
+def encode_answer(frame: Frame, message: MessageValue) -> bytes:
+    """Return the payload like `encode_used`, but missing fields are filled in as by `completed`."""
+    return encode_used(frame, completed(frame, message))
+
+
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
     """Return the message with missing fields filled in: defaults, zeros or empty values."""
     filled: MessageValue = _filled(_whole(frame.nodes, message, 0), message)

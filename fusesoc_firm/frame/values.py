@@ -5,6 +5,7 @@ A text is a `str`. Bytes that are not UTF-8, and unpaired UTF-16 units, are kept
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from reprlib import Repr
@@ -22,6 +23,12 @@ _repr.maxstring = _repr.maxother = _repr.maxlong = 60
 
 class CodecError(ValueError):
     """A value that does not fit its message, or bytes that do not fit their frame."""
+
+    @property
+    def field(self) -> str:
+        """The last name of the field in the text, or "" if the text names none."""
+        found = re.search(r"'(?:[^' ]+\.)?(\w+)'", str(self))
+        return found[1] if found else ""
 
 
 class SignallingNan(float):
@@ -150,8 +157,10 @@ def check_bound(part: Data | Loop, count: int) -> None:
 
 def _member(value: Any, name: str) -> Any:
     """Return the member `name`, or `_MISSING`; a missing message has no members, but its fields may have defaults."""
-    if value is _MISSING or not isinstance(value, Mapping):
+    if value is _MISSING:
         return _MISSING
+    if not isinstance(value, Mapping):
+        raise CodecError(f"the message with the field '{name}' must be a mapping of fields, not {shown(value)}")
     return value.get(name, _MISSING)
 
 

@@ -19,11 +19,11 @@ VALUES = "geometry_msgs/PoseWithCovariance", "geometry_msgs/Accel"
 STREAMS = "sensor_msgs/Range", "std_msgs/String"
 # Old text, new text, the reported line and column, and a part of the report.
 OF_VALUES = [
-    ("pose_position_x_in", "pose_x_in", "7:17", "parameter 'pose_x_in' is not in the interface"),
-    ("pose_position_x_in,", "x,", "7:17", "needed here: double pose_position_x_in"),
-    ("port=pose_position_x_in", "port=pose_x_in", "8:41", "port 'pose_x_in' is not in the interface"),
-    ("double pose_position_x_in, ", "", "7:6", "function 'acc' has no parameter 'pose_position_x_in'"),
-    ("(double pose_position_x_in", "(int level, double pose_position_x_in", "7:14", "= remove it"),
+    ("pose_position_x_in", "pose_x_in", "8:17", "parameter 'pose_x_in' is not in the interface"),
+    ("pose_position_x_in,", "x,", "8:17", "needed here: double pose_position_x_in"),
+    ("port=pose_position_x_in", "port=pose_x_in", "9:41", "port 'pose_x_in' is not in the interface"),
+    ("double pose_position_x_in, ", "", "8:6", "function 'acc' has no parameter 'pose_position_x_in'"),
+    ("(double pose_position_x_in", "(int level, double pose_position_x_in", "8:14", "= remove it"),
     ("x_in, double pose_position_y_in", "y_in, double pose_position_x_in", "", "parameter 1 is 'pose_position_y_in'"),
     ("(double ", "(float ", "", "is 'float pose_position_x_in', and the interface needs 'double pose_position_x_in'"),
     ("covariance_in[36]", "covariance_in[6]", "", "the interface needs 'double covariance_in[36]'"),

@@ -123,7 +123,7 @@ def test_elements_have_defaults_but_arrays_of_messages_none() -> None:
         ("float64 x\n", {}, "no value for 'x'"),
         ("string s\n", {}, "no value for 's'"),
         ("Inner a\n", {}, "no value for 'a.b'"),
-        ("Inner a\n", {"a": 1}, "no value for 'a.b'"),
+        ("Inner a\n", {"a": 1}, "the message with the field 'b' must be a mapping of fields, not 1"),
         ("Inner[] a\n", {"a": [{}]}, "no value for 'a.b'"),
         ("Inner[2] a\n", {}, "no value for 'a.b'"),
         ("uint8 x\n", {"x": 1, "y": 2}, "layout_msgs/Main has no field 'y'"),

@@ -45,6 +45,22 @@ def test_a_project_passes(project: Path) -> None:
     assert "PASS 3/3" in (project / log).read_text()
 
 
+@pytest.mark.parametrize(
+    ("language", "lines"),
+    [
+        ("python", ["edit: turn/software/turn.py (the computation)", "next: cd turn && firm sim"]),
+        ("hls", ["hardware: AMD Vitis HLS builds the function; 'firm sim' needs only g++ and GHDL"]),
+    ],
+)
+def test_each_language_says_where_it_runs(tmp_path: Path, language: str, lines: list[str]) -> None:
+    words = ("--subscribe", "geometry_msgs/Point", "--publish", "geometry_msgs/Vector3", "--language", language)
+    done = firm(tmp_path, "init", "turn", *words)
+    assert done.returncode == 0
+    assert {*lines} <= {*done.stdout.splitlines()}
+    if language == "hls":
+        assert "Vitis HLS" in (tmp_path / "turn" / "hls" / "turn.cpp").read_text().splitlines()[2]
+
+
 @pytest.mark.check
 @pytest.mark.parametrize(("tool", "content"), [("icarus", b"Icarus Verilog"), ("verilator", b" in_x [63:0] $end")])
 def test_waves_of_all_simulators(project: Path, tool: str, content: bytes) -> None:

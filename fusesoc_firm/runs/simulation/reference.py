@@ -3,8 +3,8 @@
     def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
 
 The function receives each sent message, with the name of the subscriber's block. It returns the responses that the
-system must send, each with the name of the publisher's block, and the messages to accelerators in software. Calls are
-in the order of the stimuli, and the function may keep state.
+system must send, each with the name of the publisher's block, and the messages to accelerators in software. Fields may
+be omitted, as in stimuli. Calls are in the order of the stimuli, and the function may keep state.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 from fusesoc_firm.accelerator.user_code import UserFunction, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
-from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.defaults import encode_answer
 from fusesoc_firm.runs.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import nearest
@@ -78,6 +78,7 @@ class _Model:
             self.respond.fail(
                 f"for {when}, 'respond' returned a message for {block!r}, which is not a publisher",
                 nearest(str(block), known),
+                str(block),
             )
         if not isinstance(message, Mapping):
             self.respond.fail(
@@ -85,7 +86,8 @@ class _Model:
             )
         publisher = known[block]
         try:
-            payload = encode_used(publisher.frame, message)
+            payload = encode_answer(publisher.frame, message)
         except CodecError as error:
-            self.respond.fail(f"for {when}, 'respond' returned an invalid message for '{block}': {error}")
+            fault = f"for {when}, 'respond' returned an invalid message for '{block}': {error}"
+            self.respond.fail(fault, word=error.field)
         return Response(publisher, payload, decode(publisher.frame, payload), cause)

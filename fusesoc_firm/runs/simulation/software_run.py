@@ -2,7 +2,7 @@
 
 The model supplies the messages from hardware to a block in software. A message from a block in software to hardware
 becomes a stimulus, after the stimulus that caused it. A message from a block in software to a publisher bypasses the
-hardware and is compared here.
+hardware and is compared here, if the model has messages for this publisher.
 
 A block without sources is software in another program; the stimuli contain its messages.
 """
@@ -142,9 +142,14 @@ class _Run:
 
 
 def _check_published(system: DerivedSystem, published: dict[str, list[Message]], responses: Sequence[Response]) -> None:
-    """Raise `InputError` if the messages from software to publishers differ from the model's."""
+    """Raise `InputError` if the messages from software to publishers differ from the model's.
+
+    For a publisher without messages of the model, the software's functions are the model.
+    """
     for topic in system.software.publishers:
         wanted = [response for response in responses if response.publisher.block == topic.block]
+        if not wanted:
+            continue
         found = published.get(topic.block, [])
         for number, (message, response) in enumerate(zip(found, wanted, strict=False)):
             payload = encode_used(topic.frame, message)

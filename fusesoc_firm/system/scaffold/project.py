@@ -17,7 +17,6 @@ from typing import Any
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import bounded_payload, longest_payload, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop
-from fusesoc_firm.frame.model import Path as FieldPath
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.library import Libraries
 from fusesoc_firm.message.middleware import Middleware, middleware_of
@@ -333,19 +332,9 @@ def _length(taken: Frame, given: Frame, longest: int) -> tuple[list[str], list[i
 
 def _model(project: Project, loaded: LoadedSystem, given: Frame) -> Context:
     types = {str(item.accelerator.name): item for item in loaded.system.accelerator_types}
-    paths: frozenset[FieldPath]
-    forwarded: list[str] = []
-    if project.name in types:
-        (wires,) = wires_of(types[project.name])
-        paths = wires.paths
-    else:
-        (software,) = loaded.system.software.types
-        paths = equal_paths(software.inputs[0].frame, given)
-        forwarded = [f"{project.name}_in"]
-    return {
-        "name": project.name,
-        "answer": "answer",
-        "publisher": _PUBLISHER,
-        "forwarded": forwarded,
-        "values": copied_fields(given, dict.fromkeys(paths, "message")),
-    }
+    if project.name not in types:
+        # The function is the model of its own answers.
+        return {"name": project.name, "forwarded": {"block": f"{project.name}_in"}, "answer": None}
+    (wires,) = wires_of(types[project.name])
+    values = copied_fields(given, dict.fromkeys(wires.paths, "message"))
+    return {"name": project.name, "forwarded": None, "answer": {"publisher": _PUBLISHER, "values": values}}

@@ -136,47 +136,71 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         ),
         (
             "def respond(block, m):\n    return {'left': m}\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned {'left': {",
+            "model.py:2:5: error: for message 0 to 'sub', 'respond' returned {'left': {",
         ),
         (
             "def respond(block, m):\n    return ['left']\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a list that contains 'left'",
+            "model.py:2:5: error: for message 0 to 'sub', 'respond' returned a list that contains 'left'",
         ),
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a message for 'lift', "
+                "model.py:2:14: error: for message 0 to 'sub', 'respond' returned a message for 'lift', "
                 "which is not a publisher\n"
-                "    1 | def respond(block, m):\n      | ^\n      = did you mean 'left'?"
+                "    2 |     return [('lift', m)]\n      |              ^\n      = did you mean 'left'?"
             ),
         ),
         (
             "def respond(block, m):\n    return [([], m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a message for [], "
+                "model.py:2:5: error: for message 0 to 'sub', 'respond' returned a message for [], "
                 "which is not a publisher"
             ),
         ),
         (
             "def respond(block, m):\n    return [('left', 5)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned 5 for 'left', "
+                "model.py:2:5: error: for message 0 to 'sub', 'respond' returned 5 for 'left', "
                 "which is not a mapping of fields"
             ),
         ),
         (
             "def respond(block, m):\n    return [('left', {'x': 'one', 'y': 0, 'z': 0})]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
+                "model.py:2:23: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
                 "'x' must be of type float64, not 'one'"
             ),
         ),
         (
-            "def respond(block, m):\n    return [('left', {'x': 0, 'y': 0})]\n",
+            "def respond(block, m):\n    return [('left', {'é': m['é'] if 'é' in m else 0})]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
-                "no value for 'z'"
+                "model.py:2:23: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
+                "geometry_msgs/Point has no field 'é'"
             ),
+        ),
+        (
+            "def respond(block, m):\n    def inner(): return {'x': 'é'}\n    return [('left', inner())]\n",
+            "model.py:3:5: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': 'x' must",
+        ),
+        (
+            "def respond(block, m):\n    if m:\n        return 5\n    return []\n",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned 5, which is not a list",
+        ),
+        (
+            "def respond(block, m):\n    s = 'é'; yield 'left', {'x': s}\n",
+            "model.py:2:29: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': 'x' must",
+        ),
+        (
+            "respond = lambda block, m: [('left', {'x': []})]\n",
+            "model.py:1:39: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': 'x' must",
+        ),
+        (
+            "@lambda f: f\n@lambda f: f\ndef respond(block, m):\n    return [5]\n",
+            "model.py:4:5: error: for message 0 to 'sub', 'respond' returned a list that contains 5",
+        ),
+        (
+            "class Model:\n    def __call__(self, block, m):\n        return 5\n\nrespond = Model()\n",
+            "model.py:3:9: error: for message 0 to 'sub', 'respond' returned 5, which is not a list",
         ),
         ("def answer(block, m):\n    return []\n", "error: model.py has no function 'respond(subscriber, message)'"),
         ("respond = 5\n", "error: model.py has no function 'respond(subscriber, message)'"),
@@ -186,6 +210,11 @@ def test_a_fault_of_the_model_is_shown_in_the_model(tmp_path: Path, text: str, m
     found = fault(tmp_path, text)
     assert found.startswith(message)
     assert "Traceback" not in found
+
+
+def test_an_answer_may_omit_fields(tmp_path: Path) -> None:
+    (found, _) = ask(tmp_path, "def respond(block, m):\n    return [('left', {'y': 1})]\n")
+    assert found.message == {"x": 0.0, "y": 1.0, "z": 0.0}
 
 
 def test_a_fault_below_the_model_is_shown_where_the_model_calls(tmp_path: Path) -> None:

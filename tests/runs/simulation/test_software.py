@@ -116,12 +116,22 @@ def test_a_difference_is_found_in_a_long_message(tmp_path: Path, sent: str, text
         run(tmp_path, derived(tmp_path, specification(blocks, types)), model, ("sub", message))
 
 
-@pytest.mark.parametrize(("answer", "count"), [("[('b1_in', m)]", 0), ("[('b1_in', m), ('pub', m), ('pub', m)]", 4)])
+@pytest.mark.parametrize(
+    ("answer", "count"),
+    [("[('b1_in', m)] + [('pub', m)] * next(N)", 1), ("[('b1_in', m), ('pub', m), ('pub', m)]", 4)],
+)
 def test_the_number_of_messages_is_compared(tmp_path: Path, answer: str, count: int) -> None:
-    code, model = "def soft(m):\n    return m\n", f"def respond(block, m):\n    return {answer}\n"
+    code, model = "def soft(m):\n    return m\n", f"N = iter([1, 0])\ndef respond(block, m):\n    return {answer}\n"
     with pytest.raises(InputError) as raised:
         row(tmp_path, "hard", "soft", code=code, model=model, sent=(("sub", point(1.0)),) * 2)
     assert str(raised.value) == f"error: software sends 2 messages to 'pub', but the model sends {count}"
+
+
+def test_a_function_is_the_model_of_what_it_publishes(tmp_path: Path) -> None:
+    """Its author writes the computation once."""
+    code, model = "def soft(m):\n    return {'x': 2 * m['x']}\n", "def respond(block, m):\n    return [('b1_in', m)]\n"
+    found = row(tmp_path, "hard", "soft", code=code, model=model, sent=(("sub", point(1.0)),) * 2)
+    assert [item.publisher.block for item in found.responses] == ["b1_in", "b1_in"]
 
 
 def test_what_a_model_says_of_messages_within_hardware_does_not_count(tmp_path: Path) -> None:
@@ -136,8 +146,8 @@ def test_what_a_model_says_of_messages_within_hardware_does_not_count(tmp_path: 
         code = "def soft(m):\n    return m\n"
         found = row(tmp_path, *kinds, code=code, model=model, sent=(("sub", point(1.0)),))
         assert [item.publisher.block for item in found.responses] == publishers
-    with pytest.raises(InputError, match="'respond' returned an invalid message for 'b0_in': no value for 'x'"):
-        row(tmp_path, "hard", model="def respond(block, m):\n    return [('b0_in', {})]\n", sent=TWO)
+    with pytest.raises(InputError, match=r"'respond' returned an invalid message for 'b0_in': .* has no field 'v'"):
+        row(tmp_path, "hard", model="def respond(block, m):\n    return [('b0_in', {'v': 1})]\n", sent=TWO)
 
 
 def test_software_may_send_nothing_and_keep_state(tmp_path: Path) -> None:
@@ -357,22 +367,22 @@ def test_a_model_must_say_what_goes_to_software(tmp_path: Path) -> None:
         (
             "def soft(m):\n    return 5\n",
             (
-                "soft.py:1:1: error: for message 0 to 'b0', 'soft' returned 5, which is not a mapping of fields\n"
-                "    1 | def soft(m):\n      | ^\n"
+                "soft.py:2:5: error: for message 0 to 'b0', 'soft' returned 5, which is not a mapping of fields\n"
+                "    2 |     return 5\n      |     ^\n"
                 "      = the function must return geometry_msgs/Point as a mapping, or None to send nothing"
             ),
         ),
         (
             "def soft(m):\n    return [m]\n",
-            "soft.py:1:1: error: for message 0 to 'b0', 'soft' returned [{'x': 1.0",
+            "soft.py:2:5: error: for message 0 to 'b0', 'soft' returned [{'x': 1.0",
         ),
         (
-            "\ndef soft(m):\n    return {'x': 1.0, 'y': 0.0}\n",
-            "soft.py:2:1: error: for message 0 to 'b0', 'soft' returned an invalid message: no value for 'z'\n",
+            "\ndef soft(m):\n    return {'x': 1.0, 'v': 0.0}\n",
+            "soft.py:3:23: error: for message 0 to 'b0', 'soft' returned an invalid message: geometry_msgs/Point",
         ),
         (
             "def soft(m):\n    return {**m, 'x': 'one'}\n",
-            "soft.py:1:1: error: for message 0 to 'b0', 'soft' returned an invalid message: 'x' must be of type",
+            "soft.py:2:18: error: for message 0 to 'b0', 'soft' returned an invalid message: 'x' must be of type",
         ),
         ("if False:\n    def soft(m): ...\n", "error: soft.py has no function 'soft(message)'\n"),
     ],
@@ -407,7 +417,7 @@ def test_a_function_returns_as_many_messages_as_it_has_outputs(
     blocks += instance("h", "hard", "pub") + converter("pub", "publisher", "Point")
     with pytest.raises(InputError) as raised:
         run(tmp_path, derived(tmp_path, specification(blocks, types)), "def respond(*_):\n    return []\n", *TWO)
-    assert "soft.py:1:1: error: for message 0 to 's', 'soft' returned " in str(raised.value)
+    assert "soft.py:2:5: error: for message 0 to 's', 'soft' returned " in str(raised.value)
     assert f"      = {hint}" in str(raised.value)
 
 
