@@ -31,8 +31,8 @@ CORPUS ?=
 VERIFY_OPTIONS ?=
 # Parts of the bench, such as BENCH='area cycles'; if empty, all run. BENCH=--help lists them.
 BENCH ?=
-# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; without pages, all are processed.
-DOCS ?=
+# Options and pages for make pages, such as PAGES=--update or PAGES=README.md; without pages, all are processed.
+PAGES ?=
 # The suite and the commands, separated by semicolons, of make debian, such as COMMANDS='make sim; .ci/run'
 SUITE ?= trixie
 COMMANDS ?= make sim; make test
@@ -82,7 +82,7 @@ offer_hook = prefix=$$(git rev-parse --show-prefix 2>/dev/null) && [ -z "$$prefi
   [ "$$(git config core.hooksPath)" != .ci/hooks ] && \
   echo "To check the messages of your commits, enable the hook: git config core.hooksPath .ci/hooks" || true
 
-.PHONY: help sim test check ci docs studio ros kilted bitstream bench matrix proofs dissertation policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
+.PHONY: help sim test check ci docs pages studio ros kilted bitstream bench matrix proofs dissertation policies constants mutants corpus fuzz fuzz-netlist debian lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -104,12 +104,15 @@ check: setup ros studio $(VENV)/.extra-lint ## Run the longer tests: live ROS, p
 ci: setup ros studio $(VENV)/.extra-lint ## Run the tests of test and check together, as continuous integration does; variables as for test
 	@$(PYTEST) -m "not thorough"
 
-docs: TOOLS = dot:graphviz
-docs: tools $(VENV)/.extra-docs ## Run the commands in the documentation, build the site in build/docs; DOCS=--update updates their output in the pages
-	@$(BIN)/python -m tools.pages $(DOCS)
+docs: tools $(VENV)/.extra-docs ## Build the site of the documentation in build/docs
+	@$(BIN)/python -m tools.pages.stage
 	@cp docs/zensical.toml build
 	@$(BIN)/zensical build --clean --strict --config-file build/zensical.toml
 	@echo "The site: build/docs/index.html"
+
+pages: TOOLS = dot:graphviz
+pages: tools $(VENV)/.extra-docs ## Run the commands in the documentation; PAGES=--update updates their output, PAGES=--install begins with an installation
+	@$(BIN)/python -m tools.pages $(PAGES)
 
 studio: $(VENV)/.extra-page ## Build the page of firm studio
 	@cd fusesoc_firm/studio/page && export PATH="$(CURDIR)/$(BIN):$$PATH" && \

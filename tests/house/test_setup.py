@@ -142,6 +142,7 @@ def test_make_without_a_target_lists_them() -> None:
         "check",
         "ci",
         "docs",
+        "pages",
         "studio",
         "kilted",
         "corpus",

@@ -16,7 +16,7 @@ from tools.pages.stage import stage
 LINES, COLUMNS = 250, 100
 # Written by commands; their lines of prose are as long as those of all pages.
 GENERATED = [DOCS / "figures", DOCS / "reference" / "licences.md"]
-# Followed by beginners, so they are run with the tests; `make docs` runs all pages.
+# Followed by beginners, so they are run with the tests; `make pages` runs all pages.
 FOLLOWED = [
     "tutorials/first-accelerator.md",
     "tutorials/first-filter.md",
@@ -128,6 +128,13 @@ def test_a_page_for_beginners_prints_what_it_shows(tmp_path: Path, name: str) ->
     assert check(Page(DOCS / name), tmp_path) == []
 
 
+def test_a_tutorial_begins_with_its_installation() -> None:
+    """The workspace of the first converter is an existing one, in which a separate test follows it."""
+    names = [path for path in sorted((DOCS / "tutorials").glob("*.md")) if path.stem != "first-converter"]
+    assert len(names) >= 5
+    assert [path.stem for path in names if not next(blocks(Page(path))).installs] == []
+
+
 def test_the_first_filter_takes_forty_lines_and_three_commands() -> None:
     """Lines that the skeleton already has, blank lines and comments are not typed; each edit of sed is a line."""
     text = (DOCS / "tutorials/first-filter.md").read_text(encoding="utf-8")
@@ -210,6 +217,29 @@ def test_a_command_that_fails_without_an_error_is_a_fault(page: Path) -> None:
     page.write_text("```console\n$ false\n```\n", encoding="utf-8")
     with pytest.raises(RuntimeError, match="false: exit status 1"):
         checked(page)
+
+
+def test_a_page_is_followed_in_one_shell(page: Path) -> None:
+    (page.parent / "scratch" / "a").mkdir(parents=True)
+    page.write_text(
+        "```console\n$ cd a && export WORD=new\n$ echo $WORD; basename $PWD; exit 0\nnew\na\n```\n\n"
+        "<!-- in the checkout -->\n```console\n$ ls Makefile\nMakefile\n```\n\n"
+        "<!-- file: b.txt -->\n```text\nb\n```\n\n```console\n$ cat ../b.txt\nb\n```\n",
+        encoding="utf-8",
+    )
+    assert checked(page) == []
+
+
+def test_a_page_begins_with_its_installation_on_request(page: Path) -> None:
+    page.write_text(
+        "<!-- installs -->\n```console\n$ echo noise; test -f /path/to/checkout/Makefile && export FIRM=there\n```\n\n"
+        "```console\n$ echo $FIRM\nthere\n```\n",
+        encoding="utf-8",
+    )
+    folder = page.parent / "scratch"
+    folder.mkdir()
+    assert check(Page(page), folder, installs=True) == []
+    assert "-there" in check(Page(page), folder)
 
 
 def test_a_picture_that_no_command_makes_is_found(page: Path) -> None:

@@ -5,13 +5,15 @@
     geometry_msgs/Point ...
     ```
 
-The blocks of a page run in order in one new folder. A line `...` of the output stands for
+The blocks of a page run in order, as in one shell: a command begins in the folder and with the exported variables of
+the one before it, at first in a new folder. A line `...` of the output stands for
 any lines: what follows it, up to the next, is found by its first line. HTML comments on
 the line before a block say what a reader of the rendered page need not:
 
     <!-- not run: it needs a board -->        the block is shown only
     <!-- in the checkout -->                  it runs in the checkout, not in the page's folder
-    <!-- file: robot.yaml -->                 the block, in any language, is written to that file
+    <!-- file: robot.yaml -->                 the block, in any language, is written to that file, from the first folder
+    <!-- installs -->                         it runs, without a comparison, if a session begins with an installation
 
 Times are compared as `0 s`. A picture that a page shows must be made by one of its commands, by `-o FILE` of that name,
 or be in `TESTED_PICTURES`; its words are compared, as coordinates differ between versions of Graphviz.
@@ -34,11 +36,16 @@ from tools.pages.page import Page
 TESTED_PICTURES = frozenset({"house.svg", "terminal.svg", "waves.svg"})
 """Pictures that separate tests compare with the code."""
 _ELISION = "..."
-_COMMENT = re.compile(r"<!-- (?:(?P<checkout>in the checkout)|(?P<kind>not run|file): (?P<value>.+?)) -->")
+_COMMENT = re.compile(
+    r"<!-- (?:(?P<checkout>in the checkout)|(?P<installs>installs)|(?P<kind>not run|file): (?P<value>.+?)) -->"
+)
 _TIME = re.compile(r"\b\d+(\.\d+)?(?= (s|ms|seconds)\b)")
 # What make and Edalize say about folders; `make sim` leaves it out, too.
 _FOLDERS = re.compile(r"(make\[\d+\]: )?(Entering|Leaving) directory '")
 _SECONDS = 300
+# What a page calls this checkout, and the end of a command: its folder and variables are those of the next one.
+_CHECKOUT = "/path/to/checkout"
+_KEEP = """trap '{ pwd; env --null; } >"$PAGE_STATE"' EXIT"""
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,11 @@ class Block:
         """Whether it runs in the checkout."""
         return bool(self.comment and self.comment["checkout"])
 
+    @property
+    def installs(self) -> bool:
+        """Whether it installs the product."""
+        return bool(self.comment and self.comment["installs"])
+
     def steps(self) -> Iterator[tuple[str, list[str]]]:
         """Each command, `\\` at an end of line included, with the lines that it is to print."""
         lines = list(self.lines)
@@ -80,10 +92,16 @@ class Block:
 
 @dataclass
 class Session:
-    """A reader at a terminal, in a folder of their own."""
+    """A reader at a terminal, in a folder of their own; with `installs`, the reader installs the product first."""
 
     folder: Path
+    installs: bool = False
     made: dict[str, Path] = field(default_factory=dict)
+    _here: Path = field(init=False)
+    _variables: dict[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._here, self._variables = self.folder, self._environment()
 
     def run(self, command: str, block: Block) -> list[str]:
         """What the command of a block prints; paths of this machine are those of any other.
@@ -92,11 +110,12 @@ class Session:
             RuntimeError: the command failed and told of no error
 
         """
-        folder = REPOSITORY if block.is_in_checkout else self.folder
+        folder = REPOSITORY if block.is_in_checkout else self._here
+        script = command.removeprefix("$ ").replace(_CHECKOUT, str(REPOSITORY))
         done = subprocess.run(
-            ["bash", "-c", command.removeprefix("$ ")],
+            ["bash", "-c", f"{_KEEP}\n{script}"],
             cwd=folder,
-            env=self._environment(),
+            env=self._variables,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -106,6 +125,10 @@ class Session:
         )
         if done.returncode and "error" not in done.stdout:
             raise RuntimeError(f"{command}: exit status {done.returncode}\n{done.stdout}")
+        if not block.is_in_checkout:
+            here, _, variables = self._state.read_text(encoding="utf-8").partition("\n")
+            self._here = folder = Path(here)
+            self._variables = dict(item.split("=", 1) for item in variables.split("\0") if item)
         for path in re.findall(r" -o (\S+)", command):
             self.made[Path(path).name] = folder / path
         text = done.stdout.replace(str(self.folder), "/home/me").replace(str(REPOSITORY), "/home/me/fusesoc_firm")
@@ -113,10 +136,17 @@ class Session:
 
     def _environment(self) -> dict[str, str]:
         kept = {name: os.environ[name] for name in ("PATH", "LANG", "FUSESOC_FIRM_CACHE") if name in os.environ}
-        programs = f"{Path(sys.executable).parent}:{kept.get('PATH', os.defpath)}"
+        programs = kept.get("PATH", os.defpath)
+        if not self.installs:
+            programs = f"{Path(sys.executable).parent}:{programs}"
         home = self.folder / ".home"
         home.mkdir(exist_ok=True)
+        kept |= {"PAGE_STATE": str(self._state)}
         return kept | {"PATH": programs, "HOME": str(home), "COLUMNS": "100", "PYTHONUNBUFFERED": "1"}
+
+    @property
+    def _state(self) -> Path:
+        return self.folder / ".home" / "state"
 
 
 def blocks(page: Page) -> Iterator[Block]:
@@ -131,9 +161,12 @@ def blocks(page: Page) -> Iterator[Block]:
                 yield block
 
 
-def check(page: Page, folder: Path, *, is_updated: bool = False) -> list[str]:
-    """Run the page's blocks; the differences, or none where `is_updated` writes them into the page."""
-    session = Session(folder)
+def check(page: Page, folder: Path, *, is_updated: bool = False, installs: bool = False) -> list[str]:
+    """Run the page's blocks; the differences, or none where `is_updated` writes them into the page.
+
+    With `installs`, the page's own commands install the product.
+    """
+    session = Session(folder, installs)
     faults: list[str] = []
     lines = page.text.splitlines()
     shift = 0
@@ -141,6 +174,9 @@ def check(page: Page, folder: Path, *, is_updated: bool = False) -> list[str]:
         if block.file:
             (folder / block.file).parent.mkdir(parents=True, exist_ok=True)
             (folder / block.file).write_text("".join(f"{line}\n" for line in block.lines), encoding="utf-8")
+        elif block.installs:
+            for command, _ in block.steps() if installs else ():
+                session.run(command, block)
         elif not block.reason:
             shown = [line for step in block.steps() for line in _shown(step, session.run(step[0], block))]
             if not is_updated:

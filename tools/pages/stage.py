@@ -1,4 +1,7 @@
-"""The source of the site: README.md, docs, and every file in the repository that they link to, at its place."""
+"""The source of the site: README.md, docs, and every file in the repository that they link to, at its place.
+
+`python -m tools.pages.stage` copies it to build/pages for `make docs`.
+"""
 
 from __future__ import annotations
 
@@ -22,3 +25,7 @@ def stage(folder: Path) -> None:
         linked = {link.file for link in Page(file).links} if file.suffix == ".md" else set()
         waiting += [path for path in linked - seen if path.is_file()]
         seen |= linked
+
+
+if __name__ == "__main__":
+    stage(REPOSITORY / "build" / "pages")
