@@ -81,7 +81,13 @@ class System:
         return f"<system {self.name}: {', '.join(self.subscribers)} to {', '.join(self.publishers)}>"
 
     def simulate(
-        self, stimuli: Stimuli, *, tool: str | None = None, seed: int = 1, stall_percent: int = 0
+        self,
+        stimuli: Stimuli,
+        *,
+        tool: str | None = None,
+        seed: int = 1,
+        stall_percent: int = 0,
+        quiet: int = QUIET_CYCLES,
     ) -> list[Answer]:
         """Send messages to the simulated system, one after the other, and return its answers.
 
@@ -89,7 +95,7 @@ class System:
         stimuli or a bag. The options and errors are those of `start` and `Run.send`.
         """
         payloads = self._payloads(stimuli)
-        with self.start(tool=tool, seed=seed, stall_percent=stall_percent) as run:
+        with self.start(tool=tool, seed=seed, stall_percent=stall_percent, quiet=quiet) as run:
             return [answer for block, payload in payloads for answer in run.send_payload(block, payload)]
 
     def start(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import math
 import random
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -153,13 +154,16 @@ def test_hashes_are_those_of_rosbags() -> None:
         ({"orientation_covariance": [0] * 8}, "'orientation_covariance' must be a list of 9"),
         ({"orientation_covariance": np.array(["a"] * 9)}, "'orientation_covariance' must be of type float64"),
         ({"orientation_covariance": 1.0}, "'orientation_covariance' must be a list of 9"),
+        ({"orientation": 5}, "the message with the field 'x' must be a mapping of fields, not 5"),
+        ({"orientation": [0, 0, 0, 1]}, "the message with the field 'x' must be a mapping of fields, not [0, 0, 0, 1]"),
+        ({"header": {"frame_id": b"imu"}}, "'header.frame_id' must be of type string"),
         ({"orientation": {"v": 1}}, "has no field 'orientation.v'"),
         ({"header": {"stamp": {"sec": 2**31}}}, "'header.stamp.sec' must be of type int32"),
         ({"header": {"stamp": {"sec": np.float32(1)}}}, "'header.stamp.sec' must be of type int32"),
     ],
 )
 def test_a_value_that_does_not_fit_is_refused(message: dict[str, Any], fault: str) -> None:
-    with pytest.raises(CodecError, match=fault.replace("[", r"\[")):
+    with pytest.raises(CodecError, match=re.escape(fault)):
         codec("sensor_msgs/Imu").encode(message)
 
 
