@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.message.joint import separate_texts
+from fusesoc_firm.message.joint import Heading, Language, header, separate_texts
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
@@ -40,7 +40,8 @@ __all__ = ["BAGS", "Bag", "BagDefinitions", "Foreign", "Form", "Recorded", "Stre
 
 BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file, which may be compressed (.zstd)"
 _ENCODINGS = {"cdr": ROS2, "ros1": ROS1}
-_LANGUAGES = {"ros1msg": ROS1, "ros2msg": ROS2}
+_LANGUAGES = {"ros1msg": ROS1, "ros2msg": ROS2, "ros2idl": ROS2, "omgidl": ROS2}
+_IDL = ("ros2idl", "omgidl")
 
 
 class Form(Enum):
@@ -151,10 +152,15 @@ class Bag:
 
 @dataclass(frozen=True)
 class BagDefinitions:
-    """The definitions in a bag: the middleware, and the distinct definition texts of each message."""
+    """The definitions in a bag: the middleware, and the distinct texts of each definition.
+
+    `empty` are the messages whose definition is an empty text: those without fields, and, in bags of old recorders,
+    those whose definition was not found.
+    """
 
     ros: Middleware
-    texts: Mapping[MessageName, tuple[str, ...]]
+    texts: Mapping[Heading, tuple[str, ...]]
+    empty: frozenset[MessageName]
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -165,7 +171,7 @@ def bag_files(path: Path) -> list[Path]:
 def definitions_in(path: Path) -> BagDefinitions:
     """Return the message definitions in a bag; only the bag's index is read. May raise `InputError`.
 
-    Types without a definition in the `.msg` language are omitted.
+    Types without a definition in a language of ROS are omitted.
     """
     files = bag_files(path)
     with in_part(files):
@@ -188,13 +194,17 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
         with _readable(path, part), opened(part) as file, _readable(path, part, file.remedy):
             channels += file.channels().values()
     ros = _spoken(channels)
-    texts: dict[MessageName, dict[str, None]] = {}
-    for stream in (_stream(channel) for channel in channels if _ENCODINGS.get(channel.encoding) is ros):
-        if stream.definition:
-            with suppress(InputError):  # a type whose name is not allowed in a specification
-                for name, text in separate_texts(parse_name(stream.type), stream.definition).items():
-                    texts.setdefault(name, {})[text] = None
-    return BagDefinitions(ros, {name: tuple(found) for name, found in texts.items()})
+    texts: dict[Heading, dict[str, None]] = {}
+    empty: set[MessageName] = set()
+    for channel in (channel for channel in channels if _ENCODINGS.get(channel.encoding) is ros):
+        stream = _stream(channel)
+        with suppress(InputError):  # a type whose name is not allowed in a specification
+            if stream.definition:
+                for heading, text in separate_texts(parse_name(stream.type), stream.definition).items():
+                    texts.setdefault(heading, {})[text] = None
+            elif _LANGUAGES.get(channel.language) is ros and not channel.definition.strip():
+                empty.add(parse_name(stream.type))
+    return BagDefinitions(ros, {heading: tuple(found) for heading, found in texts.items()}, frozenset(empty))
 
 
 @contextmanager
@@ -264,8 +274,14 @@ def _form(ros: Middleware, file: BagFile) -> Form:
 
 
 def _stream(channel: Channel) -> Stream:
-    is_text = _LANGUAGES.get(channel.language) is _ENCODINGS[channel.encoding]
-    return Stream(channel.topic, channel.type, channel.digest, channel.definition if is_text else "")
+    text = channel.definition.strip()
+    # Some recorders write the type's name where they do not know the definition.
+    is_name = text in (channel.type, channel.type.replace("/msg/", "/"))
+    is_text = _LANGUAGES.get(channel.language) is _ENCODINGS[channel.encoding] and text and not is_name
+    definition = channel.definition if is_text else ""
+    if is_text and channel.language in _IDL and not text.startswith("="):
+        definition = header(Language.IDL, channel.type) + definition
+    return Stream(channel.topic, channel.type, channel.digest, definition)
 
 
 @contextmanager

@@ -100,6 +100,9 @@ _UPPER_CAMEL = re.compile(
 )
 _UPPER_CAMEL_TEXT = "letters and digits, and starts with a capital letter"
 
+IDL_NAME = NameRule("name", _ANY_CASE, _ANY_CASE_TEXT)
+"""The rule for names in `.idl` files, which rosidl restricts less than names in `.msg` files."""
+
 ROS1 = Dialect(
     title="ROS 1",
     package_name=NameRule("package name", _ANY_CASE, _ANY_CASE_TEXT),

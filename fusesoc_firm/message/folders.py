@@ -1,4 +1,4 @@
-"""Find `.msg`, `.srv` and `.action` files.
+"""Find `.msg`, `.srv`, `.action` and `.idl` files.
 
 The search covers packages, workspaces of packages, flat folders of packages, and installed ROS distributions.
 """
@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from fusesoc_firm.message import idl
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.text.files import read_regular
@@ -19,15 +20,16 @@ _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
 
 # The usual folder names of the files; ROS also uses them as suffixes.
 _KINDS = tuple(InterfaceKind)
-_ROS_SUFFIXES = {kind.value: kind for kind in InterfaceKind}
+_ROS_SUFFIXES: Mapping[str, InterfaceKind | None] = {**{kind.value: kind for kind in _KINDS}, idl.SUFFIX: None}
 
 InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
-def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_SUFFIXES) -> InterfaceFiles:
+def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind | None] = _ROS_SUFFIXES) -> InterfaceFiles:
     """Return all interface files below a folder, by kind and name; each name maps to all files that define it.
 
-    The suffix of a file determines its kind.
+    The suffix of a file determines its kind. An `.idl` file, whose suffix has no kind, declares the names and kinds of
+    its interfaces; it is ignored if the package has another file for the same name, from which rosidl generated it.
 
     A file belongs to the package of the nearest `package.xml` in its parent folders. Without a `package.xml`, the
     package is the folder above `msg/`, `srv/` or `action/` or, in a flat layout, the file's folder. Hidden folders
@@ -38,9 +40,31 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_S
     for path in _walk(folder, suffixes):
         if path.parent not in packages:
             packages[path.parent] = _package_name(path.parent, folder)
-        name = MessageName(packages[path.parent], path.stem)
-        found[suffixes[path.suffix[1:]]].setdefault(name, []).append(path)
+        package, kind = packages[path.parent], suffixes[path.suffix[1:]]
+        declared = [(kind, MessageName(package, path.stem))] if kind else _declared(path, package)
+        for each, name in declared:
+            found[each].setdefault(name, []).append(path)
+    for names in found.values():
+        for name, paths in names.items():
+            names[name] = [path for path in paths if not is_idl(path)] or paths
     return found
+
+
+def is_idl(path: Path) -> bool:
+    """Return whether a file is an `.idl` file by its name."""
+    return path.suffix == f".{idl.SUFFIX}"
+
+
+def _declared(path: Path, package: str) -> list[tuple[InterfaceKind, MessageName]]:
+    """Return the interfaces in an `.idl` file, or the one that its name suggests, whose faults are reported on use."""
+    if any(path.with_suffix(f".{kind}").exists() for kind in _KINDS):
+        return []  # installed packages have an .idl file for each interface, which need not be read
+    kind = next((kind for kind in _KINDS if kind == path.parent.name), InterfaceKind.MESSAGE)
+    try:
+        text = read_regular(path, MOST_FILE_BYTES).decode(errors="replace")
+    except OSError:
+        text = ""
+    return idl.declared_in(text, package) or [(kind, MessageName(package, path.stem))]
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:

@@ -10,13 +10,16 @@ import copy
 import difflib
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
-from fusesoc_firm.message.folders import InterfaceFiles, interface_files
+from fusesoc_firm.message.folders import InterfaceFiles, interface_files, is_idl
+from fusesoc_firm.message.idl import declared_in, parse_idl
+from fusesoc_firm.message.joint import INTERFACES, Language
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware, known_suffixes, middlewares
 from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message
 from fusesoc_firm.message.printer import to_text
@@ -25,6 +28,9 @@ from fusesoc_firm.message.unsupported import unsupported_word
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.text.files import read_regular
 from fusesoc_firm.tools.reads import Input, Part
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.bag_reader import BagDefinitions
 
 # The hint about additional sources.
 _FURTHER = "; add places with 'paths' in the specification or core, or with --path"
@@ -37,12 +43,14 @@ _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 class _Source:
     """The files that define a message, which must be equal, and the service or action that they define, if any.
 
-    For a bag, `texts` holds its definitions of the message, which must be equivalent.
+    For a bag, `texts` holds its definitions of the message, which must be equivalent. An `.idl` text may define several
+    messages.
     """
 
     paths: tuple[Path, ...]
     interface: Interface | None = None
     texts: tuple[str, ...] = ()
+    is_idl: bool = False
 
 
 class MessageLibrary:
@@ -187,11 +195,12 @@ class MessageLibrary:
         faults.raise_if_any()
         for place in reversed(places):
             self._add(found[place])
-            self._sources |= bags.get(place, {})
+            if bag := bags.get(place):
+                self._add_bag(place, bag)
         self._places = [*places, *self._places]
 
-    def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
-        """Return the definitions in a bag.
+    def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> BagDefinitions | None:
+        """Return the definitions in a bag of this library's middleware, or None.
 
         If `path` is not a bag, check that another middleware's library can use it.
         """
@@ -200,28 +209,48 @@ class MessageLibrary:
 
         if not is_bag(path):
             _check_folder(path, source, faults)
-            return {}
+            return None
         try:
             bag = definitions_in(path)
         except InputError as error:
             faults.take(error, source)
-            return {}
-        if not bag.texts:
+            return None
+        if not bag.texts and not bag.empty:
             faults.error(
                 f"message path '{path}' is a bag without message definitions",
                 source,
                 "give the folder with the message definitions",
             )
-        return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
+        return bag if bag.ros == self.ros else None
 
     def _add(self, files: InterfaceFiles) -> None:
         """Add the files of a folder before the existing files."""
-        for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE):
+        for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE, InterfaceKind.MESSAGE):
             for name, paths in files[kind].items():
-                interface = Interface(name, kind, self.ros, self._has_events)
-                self._interfaces[interface] = paths[0]
-                self._sources |= dict.fromkeys(interface.messages, _Source(tuple(paths), interface))
-        self._sources |= {name: _Source(tuple(paths)) for name, paths in files[InterfaceKind.MESSAGE].items()}
+                self._add_source(kind, name, _Source(tuple(paths), is_idl=is_idl(paths[0])))
+
+    def _add_bag(self, path: Path, bag: BagDefinitions) -> None:
+        """Add the definitions in a bag before the existing ones, except for empty ones of known messages."""
+        found: dict[InterfaceKind, dict[MessageName, _Source]] = {kind: {} for kind in InterfaceKind}
+        for (language, name), texts in bag.texts.items():
+            source = _Source((path,), texts=texts, is_idl=language is Language.IDL)
+            for kind, declared in _declared(language, name, texts[0]):
+                found[kind].setdefault(declared, source)
+        for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE, InterfaceKind.MESSAGE):
+            for name, source in found[kind].items():
+                self._add_source(kind, name, source)
+        for name in bag.empty:
+            if not self._is_message(name):
+                self._sources[name] = _Source((path,), texts=("",))
+
+    def _add_source(self, kind: InterfaceKind, name: MessageName, source: _Source) -> None:
+        """Add the source of a message, or of all messages of a service or action."""
+        if kind is InterfaceKind.MESSAGE:
+            self._sources[name] = source
+            return
+        interface = Interface(name, kind, self.ros, self._has_events)
+        self._interfaces[interface] = source.paths[0]
+        self._sources |= dict.fromkeys(interface.messages, replace(source, interface=interface))
 
     def _parse(self, name: MessageName) -> None:
         """Parse the definition of a message, and all other messages in the same file, into `_parsed`."""
@@ -229,7 +258,7 @@ class MessageLibrary:
         source = self._sources.get(name)
         interface = source.interface if source else None
         if source and source.texts:
-            file, text = f"<{source.paths[0]}>/{name}", source.texts[0]
+            file, text = f"<{source.paths[0]}>/{interface or name}", source.texts[0]
             self._check_equal(name, source, file, faults)
         elif source:
             file, text = str(source.paths[0]), _read(str(interface or name), source.paths, faults)
@@ -237,19 +266,30 @@ class MessageLibrary:
             file, text = self._store.file(name), self._store.text(name)
         found: dict[MessageName, MessageDefinition] = {}
         if not faults.found:
-            if interface:
-                found = interface.parse(text, file, faults)
-            else:
-                found = {name: self.ros.parse(text, name, self.ros, file, faults)}
-        for each in interface.messages if interface else (name,):
+            found = self._definitions(name, source, text, file, faults)
+        for each in {name, *found, *(interface.messages if interface else ())}:
             # A service's message may also have a separate `.msg` file, which takes precedence.
-            if self._sources.get(each) is source:
+            if self._sources.get(each) == source:
                 self._parsed[each] = (found.get(each), faults)
+
+    def _definitions(
+        self, name: MessageName, source: _Source | None, text: str, file: str, faults: Diagnostics
+    ) -> dict[MessageName, MessageDefinition]:
+        """Return all messages that the text of a source defines, among which is `name` unless there are faults."""
+        if source and source.interface:
+            return source.interface.parse(text, file, faults, source.is_idl)
+        if not source or not source.is_idl:
+            return {name: self.ros.parse(text, name, self.ros, file, faults)}
+        found = parse_idl(text, name.package, self.ros, file, faults)
+        if name not in found and not faults.found:
+            hint = f"the message is the struct '{name.name}' in the modules '{name.package}' and 'msg'"
+            faults.error(f"the file does not define '{name}'", SourceRef(file, 1, 1), hint)
+        return found
 
     def _check_equal(self, name: MessageName, source: _Source, file: str, faults: Diagnostics) -> None:
         """Report a fault if a bag's definitions of a message are not equivalent."""
-        parsed = (self.ros.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
-        if len({to_text(definition) for definition in parsed}) > 1:
+        parsed = (self._definitions(name, source, text, file, Diagnostics()) for text in source.texts)
+        if len({tuple(map(to_text, definitions.values())) for definitions in parsed}) > 1:
             faults.error(
                 f"the bag has different definitions of '{name}'",
                 SourceRef(file, 1, 1),
@@ -382,6 +422,13 @@ def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, f
 
 def _part(name: MessageName, source: _Source) -> Part:
     return Part(source.paths[0], str(name), source.texts[0].encode())
+
+
+def _declared(language: Language, name: MessageName, text: str) -> Sequence[tuple[InterfaceKind, MessageName]]:
+    """Return the interfaces that a definition in a bag declares."""
+    if language is Language.IDL:
+        return declared_in(text, name.package) or [(InterfaceKind.MESSAGE, name)]
+    return [(INTERFACES.get(language, InterfaceKind.MESSAGE), name)]
 
 
 def _check_folder(path: Path, source: SourceRef | None, faults: Diagnostics) -> None:

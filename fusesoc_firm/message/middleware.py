@@ -74,11 +74,12 @@ class Signature(Protocol):
 class Middleware:
     """All properties of a middleware. Each middleware has one value, and values are compared by identity.
 
-    `title` is the name in comments and messages, `number` the number in options and reports, and `words` are the names
-    in users' files. `suffixes` are the suffixes, without the dot, of the files that define messages. `folders` returns
-    the folders of these files in an environment. `store` returns the definitions of one of `distributions`, or of the
-    default for None, and raises `InputError` for any other name. `builtin_types` lists, for hints, the types that are
-    not messages. `aliases` maps former names of messages to current names; both mean the same message.
+    `title` is the name in comments and messages, `number` the number in options and reports, and `words` are the
+    names in users' files. `suffixes` are the suffixes, without the dot, of the files that define messages, each with
+    its kind; `.idl` files, which declare the kinds of their types, have None. `folders` returns the folders of these
+    files in an environment. `store` returns the definitions of one of `distributions`, or of the default for None,
+    and raises `InputError` for any other name. `builtin_types` lists, for hints, the types that are not messages.
+    `aliases` maps former names of messages to current names; both mean the same message.
     """
 
     number: int
@@ -88,7 +89,7 @@ class Middleware:
     parse: Parse
     signature: Signature
     builtin_types: frozenset[str]
-    suffixes: Mapping[str, InterfaceKind]
+    suffixes: Mapping[str, InterfaceKind | None]
     folders: Callable[[Mapping[str, str]], list[Path]]
     distributions: Callable[[], list[str]]
     store: Callable[[str | None], Store]
@@ -132,6 +133,6 @@ def middlewares() -> list[Middleware]:
     return [_registered[number] for number in sorted(_registered)]
 
 
-def known_suffixes() -> dict[str, InterfaceKind]:
+def known_suffixes() -> dict[str, InterfaceKind | None]:
     """Return the suffixes of the files that define messages, for all middlewares."""
     return {suffix: kind for middleware in _registered.values() for suffix, kind in middleware.suffixes.items()}

@@ -36,9 +36,13 @@ class MessageName:
 
 @dataclass(frozen=True)
 class PrimitiveType:
-    """A number, `bool`, or ROS 1's `time` or `duration`, by its ROS name (including `byte` and `char`)."""
+    """A number, `bool`, or ROS 1's `time` or `duration`, by its ROS name (including `byte` and `char`).
+
+    `is_character` marks the `char` of an `.idl` file; only its hash differs from that of `char` in a `.msg` file.
+    """
 
     name: str
+    is_character: bool = False
 
     def __str__(self) -> str:
         return self.name

@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1
-from fusesoc_firm.message.middleware import MessageDefinition, Middleware
+from fusesoc_firm.message.idl import parse_idl
+from fusesoc_firm.message.middleware import Definitions, MessageDefinition, Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName
-from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
-from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.message.parser import action_names, dialect_of, parse_message, parse_sections, service_names
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 # ROS 2 introduced this message, service events and hashes in Iron.
 EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")
@@ -76,9 +77,17 @@ class Interface:
         """Whether ROS defines a signature; ROS 2 distributions without service events have no hashes."""
         return self.ros is ROS1 or self.has_events
 
-    def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
-        """Parse the file's text into messages; add faults to `diagnostics`, and return the valid parts."""
-        sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
+    def parse(
+        self, text: str, file: str, diagnostics: Diagnostics, is_idl: bool = False
+    ) -> dict[MessageName, MessageDefinition]:
+        """Parse the file's text into messages; add faults to `diagnostics`, and return the valid parts.
+
+        With `is_idl`, the text is that of an `.idl` file, in which a struct is a section.
+        """
+        if is_idl:
+            sections = self._structs(parse_idl(text, self.name.package, self.ros, file, diagnostics), file, diagnostics)
+        else:
+            sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
         wrappers = [self._wrapper(suffix, wrapper, file) for suffix, wrapper in self._wrappers.items()]
         return {message.name: replace(message, kind=self.kind) for message in (*sections, *wrappers)}
 
@@ -86,6 +95,16 @@ class Interface:
     def _sections(self) -> tuple[MessageName, ...]:
         names_of = service_names if self.kind is InterfaceKind.SERVICE else action_names
         return names_of(self.name, self.ros)
+
+    def _structs(self, found: Definitions, file: str, diagnostics: Diagnostics) -> list[MessageDefinition]:
+        rule = dialect_of(self.ros).message_name
+        for name in self._sections:
+            if name not in found:
+                needed = " and ".join(section.name for section in self._sections)
+                diagnostics.error(f"the struct '{name.name}' is missing", SourceRef(file, 1, 1), f"{self} has {needed}")
+            elif not rule.accepts(name.name):
+                diagnostics.error(rule.fault(name.name, self.ros.title), found[name].source, rule.hint)
+        return [found[name] for name in self._sections if name in found]
 
     @property
     def _wrappers(self) -> _Wrappers:

@@ -27,7 +27,8 @@ from fusesoc_firm.message.model import (
     nested_message,
 )
 
-# Source: type_description_interfaces/FieldType. rosidl_adapter converts `char` to an IDL uint8, never to char.
+# Source: type_description_interfaces/FieldType. rosidl_adapter converts `char` to an IDL uint8; only the `char` of an
+# `.idl` file is a character.
 _TYPE_IDS = {
     "int8": 2,
     "uint8": 3,
@@ -43,12 +44,13 @@ _TYPE_IDS = {
     "bool": 15,
     "byte": 16,
 }
+_CHARACTER = 13
 _NESTED, _STRING, _WIDE_STRING, _BOUNDED_STRING, _BOUNDED_WIDE_STRING = 1, 17, 18, 21, 22
 # The offsets that arrays add to the type ids of their elements.
 _ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 48, 96, 144
 
-# An IDL struct cannot be empty, so rosidl_adapter adds this field.
-_ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
+# A struct in IDL cannot be empty, so rosidl_adapter adds this field to a message without fields.
+ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
@@ -125,7 +127,7 @@ class _Describer:
         definition = self._definitions[name]
         full_name = _full_name(name, definition.kind)
         if full_name not in self.descriptions:
-            members = [(field.name, field.type) for field in definition.fields] or [_ONLY_MEMBER]
+            members = [(field.name, field.type) for field in definition.fields] or [ONLY_MEMBER]
             self._describe(full_name, [self._field(member, kind) for member, kind in members])
         return full_name
 
@@ -163,7 +165,8 @@ class _Describer:
             return _described_field(name, increment + _NESTED, self.message(element.name), capacity)
         if isinstance(element, StringType):
             return _described_field(name, increment + _string_id(element), "", capacity, element.bound or 0)
-        return _described_field(name, increment + _TYPE_IDS[element.name], "", capacity)
+        type_id = _CHARACTER if element.is_character else _TYPE_IDS[element.name]
+        return _described_field(name, increment + type_id, "", capacity)
 
 
 def _described_field(

@@ -97,3 +97,33 @@ def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
 def unsupported_word(type_name: str) -> Feature | None:
     """Return the unsupported feature that this type name suggests, or None."""
     return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)
+
+
+@dataclass(frozen=True)
+class IdlFeature:
+    """A feature of IDL that messages lack: its name, and what to use in its place."""
+
+    name: str
+    hint: str
+
+
+# By the keyword or mark that begins the feature.
+IDL_FEATURES = {
+    "[": IdlFeature("arrays of arrays", "use one dimension, such as 'double x[9]' for 3 by 3, or a struct"),
+    ":": IdlFeature("inherited fields", "use a field for the base struct, such as 'Base base'"),
+    "@optional": IdlFeature(
+        "optional fields", "ROS 2 sends every field; use a sequence of at most one element, or add a boolean field"
+    ),
+    "union": IdlFeature("unions", "use a number for the variant, and a field for each variant"),
+    "map": IdlFeature("maps", "use a sequence of a struct with the fields 'key' and 'value'"),
+    "any": IdlFeature("'any' types", "use the fields 'string type' and 'sequence<uint8> data'"),
+    "fixed": IdlFeature("fixed-point numbers", "use a 'long long' in units of the last digit, or a 'double'"),
+    "long double": IdlFeature("numbers of 128 bits", "use 'double'; the type descriptions of ROS 2 lack 'long double'"),
+    "wchar": IdlFeature("wide characters", "use 'wstring<1>'; middlewares differ in the size of a 'wchar'"),
+    "bitmask": IdlFeature("bitmasks", "use an unsigned number and constants"),
+    "bitset": IdlFeature("bitsets", "use an unsigned number and constants, or one field for each part"),
+    "interface": IdlFeature("interfaces", "define a service with the structs 'NAME_Request' and 'NAME_Response'"),
+    "valuetype": IdlFeature("value types", "use a struct"),
+    "native": IdlFeature("native types", "use a struct"),
+    "exception": IdlFeature("exceptions", "use a struct"),
+}

@@ -33,7 +33,7 @@ def read_value(
     After a fault, report it and return None.
     """
     try:
-        return _scalar(piece.text, kind, dialect)
+        return scalar_of(piece.text, kind, dialect, dialect.has_quoted_strings)
     except ValueError as fault:
         shown = f"'{piece.text}' is not a value of {kind}" if piece.text else f"a value of {kind} is missing"
         diagnostics.error(shown, piece.source, str(fault))
@@ -102,10 +102,13 @@ def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
     return "" if kind.bound is None or count <= kind.bound else f"legal here: at most {kind.bound} elements"
 
 
-def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Scalar:
-    """Return the value of `text`. Raise `ValueError`, with the legal values, if it is illegal."""
+def scalar_of(text: str, kind: PrimitiveType | StringType, dialect: Dialect, has_quotes: bool) -> Scalar:
+    """Return the value of `text`. Raise `ValueError`, with the legal values, if it is illegal.
+
+    If `has_quotes`, quotes around a string are not part of its value.
+    """
     if isinstance(kind, StringType):
-        return _string(text, kind, dialect)
+        return _string(text, kind, has_quotes)
     if kind.name == "bool":
         return _boolean(text, dialect)
     if kind.name in dialect.integer_ranges:
@@ -153,8 +156,8 @@ def _float(text: str, kind: PrimitiveType) -> float:
     return value
 
 
-def _string(text: str, kind: StringType, dialect: Dialect) -> str:
-    value = _unquoted(text) if dialect.has_quoted_strings else text
+def _string(text: str, kind: StringType, has_quotes: bool) -> str:
+    value = _unquoted(text) if has_quotes else text
     if kind.bound is not None and len(value) > kind.bound:
         raise ValueError(f"legal here: at most {kind.bound} characters, not {len(value)}")
     return value

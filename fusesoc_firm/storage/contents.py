@@ -22,7 +22,8 @@ class Channel(NamedTuple):
     """The messages of one topic and type in a file.
 
     `encoding` is that of the messages (cdr, ros1, json), and `language` that of the definition (ros2msg, ros2idl).
-    Without a definition, both it and its language are empty; `digest` is the type's hash or sum, or empty.
+    Without a definition, both it and its language are empty; that of a message without fields may be an empty text.
+    `digest` is the type's hash or sum, or empty.
     """
 
     topic: str

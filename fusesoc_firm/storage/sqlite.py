@@ -53,7 +53,7 @@ class SqliteFile:
             for row in self._named_rows("message_definitions"):
                 language, text = _text(row, "encoding"), _text(row, "encoded_message_definition")
                 # rosbag2 writes an unknown definition as an empty text in an empty language.
-                definitions[_text(row, "topic_type")] = (language, text) if language and text else ("", "")
+                definitions[_text(row, "topic_type")] = (language, text) if language else ("", "")
         channels = {}
         for row in self._named_rows("topics"):
             type_, encoding = _text(row, "type"), _text(row, "serialization_format")

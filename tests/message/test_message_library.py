@@ -169,7 +169,7 @@ def test_every_bad_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         MessageLibrary(ROS1, [tmp_path / "empty", tmp_path / "missing"])
     assert [diagnostic.message for diagnostic in caught.value.diagnostics] == [
-        f"message path '{tmp_path / 'empty'}' contains no .msg, .srv or .action file",
+        f"message path '{tmp_path / 'empty'}' contains no .msg, .srv, .action or .idl file",
         f"message path '{tmp_path / 'missing'}' is neither a folder nor a bag",
     ]
 

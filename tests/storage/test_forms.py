@@ -8,6 +8,7 @@ import pytest
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.bag_reader import definitions_in, is_bag, open_bag
+from fusesoc_firm.message.joint import Heading, Language
 from fusesoc_firm.message.parser import parse_name
 from tests.storage.forms import DEBIAN, FORMS, TEXT, TOPICS, Form, has_debian_rosbag, items, version_of
 
@@ -37,5 +38,5 @@ def check_whole(folder: Path, name: str, form: Form) -> None:
         read = [(item.stream.topic, item.stamp, item.payload) for item in bag.messages(TOPICS)]
     assert read == [tuple(item) for item in found]
     if not name.startswith("sqlite"):
-        text = definitions_in(path).texts[parse_name("geometry_msgs/Point")][0]
+        text = definitions_in(path).texts[Heading(Language.MSG, parse_name("geometry_msgs/Point"))][0]
         assert text.strip().splitlines()[-3:] == TEXT.splitlines()

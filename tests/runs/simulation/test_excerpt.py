@@ -71,7 +71,7 @@ def test_a_project_has_the_first_messages_and_all_definitions(
     assert main(["init", "turn", "--from-bag", source.name, "--in", "/p", "--out", "lab_msgs/Tilt"]) == 0
     stimuli = tmp_path / "turn" / f"stimuli{SUFFIXES[form]}"
     assert read(stimuli) == [item for item in read(source) if item[0] == "/p"][:10]
-    assert {str(name) for name in definitions_in(stimuli).texts} == {"geometry_msgs/Point", "lab_msgs/Tilt"}
+    assert {str(heading.name) for heading in definitions_in(stimuli).texts} == {"geometry_msgs/Point", "lab_msgs/Tilt"}
     subscriber, _, publisher = specification(tmp_path / "turn")["blocks"]
     assert (subscriber["topic"], subscriber["message"]) == ("/p", "geometry_msgs/Point")
     assert "topic" not in publisher
