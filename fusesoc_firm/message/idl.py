@@ -18,7 +18,7 @@ type that the file does not declare is another message. After a fault, parsing c
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -47,7 +47,7 @@ from fusesoc_firm.message.values import scalar_of
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 SUFFIX = "idl"
-_PRIMITIVES = {
+PRIMITIVES = {
     "boolean": PrimitiveType("bool"),
     "octet": PrimitiveType("byte"),
     "char": PrimitiveType("char", is_character=True),
@@ -67,8 +67,10 @@ _PRIMITIVES = {
 _ENUMERATOR = PrimitiveType("int32")
 _DECLARATIONS = "legal here: module, struct, enum, const, typedef"
 _KINDS = {kind.value: kind for kind in InterfaceKind}
-# The annotations that are not ignored.
-_EFFECTIVE = frozenset({"default", "optional", "value"})
+_PARTS = {InterfaceKind.SERVICE: ("_Request", "_Response"), InterfaceKind.ACTION: ("_Goal", "_Result", "_Feedback")}
+# The annotations of members and enumerators that are not ignored.
+_OF_MEMBERS = ("default", "optional")
+_OF_ENUMERATORS = ("value",)
 
 _Path = tuple[str, ...]
 _T = TypeVar("_T")
@@ -95,7 +97,8 @@ def declared_in(text: str, package: str) -> list[tuple[InterfaceKind, MessageNam
         tokens = IdlText(text, "").tokens
     except IdlError:
         return []
-    found = (_declared(modules, name, package) for modules, name in _structs(tokens))
+    structs = list(_structs(tokens))
+    found = (_declared(modules, name, package, structs) for modules, name in structs)
     return list(dict.fromkeys(found))
 
 
@@ -113,12 +116,15 @@ def _structs(tokens: Sequence[Token]) -> Iterator[tuple[_Path, str]]:
             scopes.append(None)
 
 
-def _declared(modules: _Path, name: str, package: str) -> tuple[InterfaceKind, MessageName]:
-    message = _message_name(modules, name, package)
-    kind = _kind_of(modules)
-    first = {InterfaceKind.SERVICE: "_Request", InterfaceKind.ACTION: "_Goal"}.get(kind)
-    if first and name.endswith(first):
-        return kind, MessageName(message.package, name.removesuffix(first))
+def _declared(
+    modules: _Path, name: str, package: str, structs: Collection[tuple[_Path, str]]
+) -> tuple[InterfaceKind, MessageName]:
+    """Return the service or action of which a struct is a part, if all its parts are declared, or else the message."""
+    kind, message = _kind_of(modules), _message_name(modules, name, package)
+    for part in _PARTS.get(kind, ()):
+        base = name.removesuffix(part)
+        if base != name and all((modules, f"{base}{other}") in structs for other in _PARTS[kind]):
+            return kind, MessageName(message.package, base)
     return InterfaceKind.MESSAGE, message
 
 
@@ -126,12 +132,15 @@ def _kind_of(modules: _Path) -> InterfaceKind:
     return _KINDS.get(modules[1], InterfaceKind.MESSAGE) if len(modules) > 1 else InterfaceKind.MESSAGE
 
 
-def _constants_module(struct: str) -> str:
+def constants_module(struct: str) -> str:
+    """Return the name of the module with a struct's constants."""
     return f"{struct}_Constants"
 
 
 def _message_name(modules: _Path, name: str, package: str) -> MessageName:
-    return MessageName(modules[0] if modules else package, name)
+    """Return the name of the message that a struct defines; modules below those of ROS are a part of the name."""
+    below = modules[2:] if len(modules) > 1 and modules[1] in _KINDS else modules[1:]
+    return MessageName(modules[0] if modules else package, "_".join((*below, name)))
 
 
 @dataclass(frozen=True)
@@ -187,11 +196,17 @@ class _Parser:
             self._declarations()
             if self._cursor.token.kind != "end":
                 self._report("unexpected '}'", self._cursor.step())
-        defined = (self._definition_of(struct) for struct in self._structs)
-        return {definition.name: definition for definition in defined}
+        found: dict[MessageName, MessageDefinition] = {}
+        for struct in self._structs:
+            definition = self._definition_of(struct)
+            if definition.name in found:
+                hint = f"the first one is in line {found[definition.name].source.line}"
+                self._report(f"another struct defines the message '{definition.name}'", struct.token, hint)
+            found.setdefault(definition.name, definition)
+        return found
 
     def _definition_of(self, struct: _Struct) -> MessageDefinition:
-        scope = (*struct.modules, _constants_module(struct.token.text))
+        scope = (*struct.modules, constants_module(struct.token.text))
         own = [constant for path, constant in self._constants.items() if path[:-1] == scope]
         constants = {constant.name: constant for constant in own}
         for enumerator in struct.enumerators:
@@ -199,7 +214,8 @@ class _Parser:
         name = _message_name(struct.modules, struct.token.text, self._package)
         fields = () if [(item.name, item.type) for item in struct.fields] == [ONLY_MEMBER] else tuple(struct.fields)
         source = self._text.place(struct.token)
-        return MessageDefinition(name, self._ros, fields, tuple(constants.values()), source, _kind_of(struct.modules))
+        kind = _kind_of(struct.modules)
+        return MessageDefinition(name, self._ros, fields, tuple(constants.values()), source, kind, is_idl=True)
 
     # --- declarations
 
@@ -252,13 +268,10 @@ class _Parser:
             return declared
         if self._cursor.token.text == ":":
             self._refuse(self._cursor.token)
-        if len(modules) > 2 or (len(modules) == 2 and modules[1] not in _KINDS):
-            hint = "legal here: the modules PACKAGE and msg, srv or action; or the module PACKAGE alone"
-            self._report(f"the struct '{'::'.join((*modules, name.text))}' is not in the modules of a type", name, hint)
         self._declare(name)
         self._types[*modules, name.text] = declared
         self._cursor.expect("{")
-        self._own_constants = _constants_module(name.text)
+        self._own_constants = constants_module(name.text)
         struct = _Struct(modules, name)
         self._members(struct)
         self._cursor.expect("}")
@@ -277,7 +290,7 @@ class _Parser:
                 self._recover(fault)
 
     def _member(self, struct: _Struct, known: dict[str, Token]) -> None:
-        annotations = self._annotations()
+        annotations = self._annotations(_OF_MEMBERS)
         if (optional := annotations.get("optional")) and optional.value is not False:
             self._refuse(optional.token)
         first = self._cursor.token
@@ -305,18 +318,22 @@ class _Parser:
             self._enumerator(enumerators)
             while self._cursor.accept(","):
                 self._enumerator(enumerators)
+            if self._cursor.token.text == "=":
+                self._refuse(self._cursor.token)
         except IdlError as fault:
             self._diagnostics.error(fault.message, fault.source, fault.hint)
             while self._cursor.token.kind != "end" and self._cursor.token.text != "}":
                 self._cursor.step()
         self._cursor.expect("}")
+        for enumerator in enumerators:
+            self._constants[*self._modules, enum.text, enumerator.name] = enumerator
         declared = _Declared(_ENUMERATOR, tuple(enumerators))
         self._types[*self._modules, enum.text] = declared
         return declared
 
     def _enumerator(self, before: list[Constant]) -> None:
         """Parse an enumerator, whose value is the successor of the one before, and add it to `before`."""
-        given = self._annotations().get("value")
+        given = self._annotations(_OF_ENUMERATORS).get("value")
         name = self._name()
         self._declare(name)
         value: Scalar = int(before[-1].value) + 1 if before else 0
@@ -366,7 +383,7 @@ class _Parser:
     def _type(self, depth: int = 0) -> _Declared:
         """Return the type that is next."""
         token = self._cursor.token
-        if token.text in ("long", "unsigned", *_PRIMITIVES):
+        if token.text in ("long", "unsigned", *PRIMITIVES):
             return _Declared(self._primitive())
         if token.text in ("string", "wstring"):
             self._cursor.step()
@@ -377,7 +394,10 @@ class _Parser:
         self._refuse(token)
         is_absolute, words = self._cursor.scoped_name()
         declared = self._resolved(self._types, is_absolute, words)
-        return declared or _Declared(MessageType(self._other_message(words, token)))
+        if declared:
+            return declared
+        modules = words[:-1] or tuple(self._modules)
+        return _Declared(MessageType(_message_name(modules, words[-1], self._package)))
 
     def _primitive(self) -> PrimitiveType:
         first = self._cursor.step()
@@ -387,15 +407,16 @@ class _Parser:
         if words == ["long"] and self._cursor.token.text == "double":
             self._refuse(first, "long double")
         name = " ".join(words)
-        if name not in _PRIMITIVES:
-            raise self._text.fault(f"'{name}' is not a type", first, f"legal here: {', '.join(_PRIMITIVES)}")
-        return _PRIMITIVES[name]
+        if name not in PRIMITIVES:
+            raise self._text.fault(f"'{name}' is not a type", first, f"legal here: {', '.join(PRIMITIVES)}")
+        return PRIMITIVES[name]
 
     def _sequence(self, depth: int) -> _Declared:
         token = self._cursor.step()
         if depth == MOST_NESTED:
             raise self._text.fault("sequences are nested too deeply", token, f"legal here: up to {MOST_NESTED} levels")
         self._cursor.expect("<")
+        self._annotations()
         declared = self._type(depth + 1)
         bound = None
         if self._cursor.token.text == ",":
@@ -430,16 +451,6 @@ class _Parser:
         self._cursor.expect(end)
         return size
 
-    def _other_message(self, words: _Path, token: Token) -> MessageName:
-        """Return the name of the message that another file defines."""
-        match words:
-            case (name,):
-                return _message_name(tuple(self._modules), name, self._package)
-            case (package, name) | (package, "msg" | "srv" | "action", name):
-                return MessageName(package, name)
-        hint = "a type of another file has the form 'package::msg::Type'"
-        raise self._text.fault(f"unknown type '{'::'.join(words)}'", token, hint)
-
     # --- names and values
 
     def _name(self) -> Token:
@@ -472,13 +483,14 @@ class _Parser:
         constant = constant or self._resolved(self._constants, is_absolute, (self._own_constants, *words))
         return constant.value if constant else None
 
-    def _annotations(self) -> _Annotations:
-        """Parse annotations, and return those with an effect."""
+    def _annotations(self, effective: Collection[str] = ()) -> _Annotations:
+        """Parse annotations, and return those with an effect here."""
         found = {}
         while self._cursor.token.text == "@":
             token = self._cursor.step()
             _, words = self._cursor.scoped_name()
-            has_effect = words[0] in _EFFECTIVE and len(words) == 1
+            self._refuse(token, f"@{words[0]}" if words == ("annotation",) else "")
+            has_effect = words[0] in effective and len(words) == 1
             value = None
             if self._cursor.token.text == "(":
                 if has_effect:

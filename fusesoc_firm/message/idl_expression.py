@@ -19,6 +19,7 @@ MOST_NESTED = 32
 """The limit of nested modules, sequences and parentheses, which are parsed by recursion."""
 # Results of larger magnitude fit into no type; the bound also limits the time of an evaluation.
 _MOST_BITS = 64
+_BOOLEANS = {"TRUE": True, "FALSE": False}
 _PRECEDENCE = {"|": 1, "^": 2, "&": 3, "<<": 4, ">>": 4, "+": 5, "-": 5, "*": 6, "/": 6, "%": 6}
 
 
@@ -163,8 +164,8 @@ class Expression:
 
     def _primary(self, depth: int, is_in_brackets: bool) -> Scalar:
         token, text = self._cursor.token, self._cursor.text
-        if token.text in ("TRUE", "FALSE"):
-            return self._cursor.step().text == "TRUE"
+        if token.kind == "word" and token.text in _BOOLEANS:
+            return _BOOLEANS[self._cursor.step().text]
         match token.kind:
             case "string":
                 return self._joined_strings()
@@ -193,6 +194,8 @@ class Expression:
         value = self._value_of(is_absolute, words)
         if value is None:
             hint = "a constant or enumerator must be declared before its use, in the same file"
+            if words[0].upper() in _BOOLEANS:
+                hint = f"legal here: {' and '.join(_BOOLEANS)}"
             raise self._cursor.text.fault(f"unknown constant '{'::'.join(words)}'", token, hint)
         return value
 

@@ -13,8 +13,10 @@ from enum import Enum
 from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.bounds import check_extents
 from fusesoc_firm.message.idl import parse_idl
+from fusesoc_firm.message.idl_printer import to_idl
 from fusesoc_firm.message.middleware import Definitions, MessageDefinition, Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message
 from fusesoc_firm.message.parser import parse_name
@@ -47,10 +49,23 @@ INTERFACES = {Language.SERVICE: InterfaceKind.SERVICE, Language.ACTION: Interfac
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """Return the joint text: the message first, then all other messages in `definitions`."""
+    """Return the joint text: the message first, then all other messages in `definitions`.
+
+    If one of them is from an `.idl` file, all are printed as `.idl` files.
+    """
     others = [definition for other, definition in definitions.items() if other != name]
+    if any(definition.is_idl for definition in definitions.values()):
+        ordered = [definitions[name], *reversed(others)]
+        return "".join(f"{header(Language.IDL, item.full_name)}{to_idl(item, definitions)}" for item in ordered)
     parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
     return f"{_LINE}\n".join(parts)
+
+
+def encoding_of(text: str, ros: Middleware) -> str:
+    """Return the encoding of a joint text in schemas of MCAP and Foxglove."""
+    if ros is ROS1:
+        return "ros1msg"
+    return "ros2idl" if text.startswith(f"{_LINE}\n{Language.IDL.value}: ") else "ros2msg"
 
 
 def header(language: Language, name: str) -> str:

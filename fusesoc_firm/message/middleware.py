@@ -19,7 +19,10 @@ from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 @dataclass(frozen=True)
 class MessageDefinition:
-    """The definition of a message in a `.msg` file or, depending on `kind`, derived from a `.srv` or `.action` file."""
+    """The definition of a message in a `.msg` file or, depending on `kind`, derived from a `.srv` or `.action` file.
+
+    `is_idl` tells that it is from an `.idl` file, whose names need not be legal in a `.msg` file.
+    """
 
     name: MessageName
     ros: Middleware
@@ -27,6 +30,12 @@ class MessageDefinition:
     constants: tuple[Constant, ...]
     source: SourceRef
     kind: InterfaceKind = InterfaceKind.MESSAGE
+    is_idl: bool = False
+
+    @property
+    def full_name(self) -> str:
+        """The name in ROS 2, such as `geometry_msgs/msg/Point`."""
+        return f"{self.name.package}/{self.kind}/{self.name.name}"
 
 
 Definitions = Mapping[MessageName, MessageDefinition]

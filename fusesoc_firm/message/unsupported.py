@@ -114,6 +114,8 @@ IDL_FEATURES = {
     "@optional": IdlFeature(
         "optional fields", "ROS 2 sends every field; use a sequence of at most one element, or add a boolean field"
     ),
+    "@annotation": IdlFeature("definitions of annotations", "annotations other than '@default' are ignored"),
+    "=": IdlFeature("values of enumerators after '='", "write '@value(1) NAME'"),
     "union": IdlFeature("unions", "use a number for the variant, and a field for each variant"),
     "map": IdlFeature("maps", "use a sequence of a struct with the fields 'key' and 'value'"),
     "any": IdlFeature("'any' types", "use the fields 'string type' and 'sequence<uint8> data'"),

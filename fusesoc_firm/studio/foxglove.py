@@ -19,7 +19,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from fusesoc_firm.message import ROS1
-from fusesoc_firm.message.joint import joint_text
+from fusesoc_firm.message.joint import encoding_of, joint_text
 from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.system.derived.model import absolute_name
 from fusesoc_firm.text.json_text import json_text
@@ -116,12 +116,12 @@ def _channel(run: Run, block: str, number: int) -> dict[str, object]:
     topic = run.topics[block]
     name, ros = topic.frame.message, topic.frame.ros
     definitions = run.libraries[ros].closure(name)
-    is_first = ros is ROS1
+    is_first, text = ros is ROS1, joint_text(name, definitions)
     return {
         "id": number,
         "topic": absolute_name(topic.name),
         "encoding": "ros1" if is_first else "cdr",
-        "schemaName": str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
-        "schemaEncoding": "ros1msg" if is_first else "ros2msg",
-        "schema": joint_text(name, definitions),
+        "schemaName": str(name) if is_first else definitions[name].full_name,
+        "schemaEncoding": encoding_of(text, ros),
+        "schema": text,
     }

@@ -41,8 +41,7 @@ class RecordedTopic:
     def of(cls, name: str, definitions: Definitions) -> RecordedTopic:
         """Return the topic of the last message in `definitions`, which contains all nested messages."""
         message = list(definitions)[-1]
-        kind = definitions[message].kind
-        type_ = f"{message.package}/{kind}/{message.name}"
+        type_ = definitions[message].full_name
         return cls(name, type_, joint_text(message, definitions), signature(message, definitions))
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fusesoc_firm.frame.codec import CodecError, decode, trimmed
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.message.bag_reader import Bag, Foreign, Form, Recorded, open_bag
+from fusesoc_firm.message.bag_reader import Bag, Foreign, Form, Recorded, definitions_in, open_bag
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Definitions, Middleware
 from fusesoc_firm.message.model import MessageName
@@ -54,8 +54,8 @@ class Recording:
                 others = [str(item) for item in bag.foreign]
                 others += [f"{stream.topic}: '{stream.type}' is not the name of a message" for stream in bag.streams]
                 fail(f"{path} contains no topics of ROS", hint="; ".join(others))
-            has_definitions = any(stream.definition for stream in bag.streams)
-            return cls(path, bag.form.ros, topics, has_definitions, bag.foreign)
+            found = definitions_in(path)
+            return cls(path, bag.form.ros, topics, bool(found.texts or found.empty), bag.foreign)
 
     @property
     def table(self) -> list[str]:

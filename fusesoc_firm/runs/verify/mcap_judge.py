@@ -53,16 +53,23 @@ def check(
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """Return definitions with names that the package accepts: it rejects the `_` in action messages."""
+    """Return definitions with names that the package accepts: it rejects those of action messages and of IDL."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
         names[name]: replace(
             definition,
             name=names[name],
-            fields=tuple(replace(field, type=_renamed_type(field.type, names)) for field in definition.fields),
+            fields=tuple(
+                replace(field, name=_field_name(number), type=_renamed_type(field.type, names))
+                for number, field in enumerate(definition.fields)
+            ),
         )
         for name, definition in definitions.items()
     }
+
+
+def _field_name(number: int) -> str:
+    return f"field{number}"
 
 
 def _renamed_type(type_: FieldType, names: Mapping[MessageName, MessageName]) -> FieldType:
@@ -80,7 +87,8 @@ def _renamed_type(type_: FieldType, names: Mapping[MessageName, MessageName]) ->
 
 def _is_same_message(found: Any, definition: MessageDefinition, definitions: Definitions, value: MessageValue) -> bool:
     return all(
-        _is_same(getattr(found, field.name), field.type, definitions, value[field.name]) for field in definition.fields
+        _is_same(getattr(found, _field_name(number)), field.type, definitions, value[field.name])
+        for number, field in enumerate(definition.fields)
     )
 
 
