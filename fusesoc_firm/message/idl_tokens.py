@@ -22,7 +22,7 @@ _TOKEN = re.compile(
     |(?P<character>L?'(?:[^'\\\n]|\\.)(?:[^'\\\n])*+')
     |(?P<number>0[xX][0-9a-fA-F]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?[dD]?)
     |(?P<word>[A-Za-z_][A-Za-z0-9_]*)
-    |(?P<mark>::|<<|[{}()\[\]<>;,=@:|^&+*/%~-])""",
+    |(?P<mark>::|<<|/(?!\*)|[{}()\[\]<>;,=@:|^&+*%~-])""",
     re.VERBOSE,
 )
 _GUARD = re.compile(r"#\s*(?:include\s*(?:\"[^\"]+\"|<[^>]+>)|pragma\b.*|ifndef\s+\w+|define\s+\w+|endif\b.*)\s*")

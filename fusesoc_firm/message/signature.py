@@ -186,7 +186,11 @@ def _array_of(kind: FieldType) -> tuple[PrimitiveType | StringType | MessageType
     if isinstance(kind, ArrayType):
         return kind.element, _ARRAY, kind.length
     if isinstance(kind, SequenceType):
-        return kind.element, _UNBOUNDED_SEQUENCE if kind.bound is None else _BOUNDED_SEQUENCE, kind.bound or 0
+        bound = kind.bound
+        if bound is None and isinstance(kind.element, StringType) and kind.element.is_wide:
+            # rosidl_parser takes the bound of a wide string for that of the sequence around it.
+            bound = kind.element.bound
+        return kind.element, _UNBOUNDED_SEQUENCE if bound is None else _BOUNDED_SEQUENCE, bound or 0
     return kind, 0, 0
 
 
