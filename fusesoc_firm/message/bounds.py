@@ -22,7 +22,7 @@ MOST_BYTES = 65536
 MOST_STREAMED_BYTES = 2**31 - 1
 """The size limit in bytes of an array of fixed size that is a stream: integers in VHDL count its bytes."""
 MOST_FILE_BYTES = 2**18
-"""The size limit in bytes of a `.msg`, `.srv` or `.action` file."""
+"""The size limit in bytes of a `.msg`, `.srv`, `.action` or `.idl` file."""
 
 _COUNT_BYTES = 4
 

@@ -22,6 +22,8 @@ _INDEX = struct.Struct("<III")
 # A header has a few fields with numbers and names.
 _MOST_HEADER_BYTES = 2**20
 _CHUNKS_IN_MEMORY = 4
+# The MD5 sum of a message with neither fields nor constants, whose definition is an empty text.
+_EMPTY_SUM = "d41d8cd98f00b204e9800998ecf8427e"
 _REINDEX = "run: rosbag reindex {}"
 
 
@@ -204,7 +206,7 @@ class _Scan:
         number, topic = record.value("conn"), _normal(record.text("topic"))
         own = _Record(_fields(data), record.start, record.size)
         definition, sum_ = own.text("message_definition"), own.text("md5sum")
-        language = "ros1msg" if definition else ""
+        language = "ros1msg" if definition or sum_ == _EMPTY_SUM else ""
         channel = Channel(topic, _normal_type(own.text("type")), "ros1", language, definition, sum_)
         if self.contents.channels.setdefault(number, channel) != channel:
             raise DamageError(f"the copies of the connection {number} of topic {topic} differ")
