@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from fusesoc_firm.message import idl
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
+from fusesoc_firm.message.idl.names import SUFFIX, declared_in
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.text.files import read_regular
 
@@ -20,7 +20,7 @@ _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
 
 # The usual folder names of the files; ROS also uses them as suffixes.
 _KINDS = tuple(InterfaceKind)
-_ROS_SUFFIXES: Mapping[str, InterfaceKind | None] = {**{kind.value: kind for kind in _KINDS}, idl.SUFFIX: None}
+_ROS_SUFFIXES: Mapping[str, InterfaceKind | None] = {**{kind.value: kind for kind in _KINDS}, SUFFIX: None}
 
 InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
@@ -52,7 +52,7 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind | None] =
 
 def is_idl(path: Path) -> bool:
     """Return whether a file is an `.idl` file by its name."""
-    return path.suffix == f".{idl.SUFFIX}"
+    return path.suffix == f".{SUFFIX}"
 
 
 def _declared(path: Path, package: str) -> list[tuple[InterfaceKind, MessageName]]:
@@ -64,7 +64,7 @@ def _declared(path: Path, package: str) -> list[tuple[InterfaceKind, MessageName
         text = read_regular(path, MOST_FILE_BYTES).decode(errors="replace")
     except OSError:
         text = ""
-    return idl.declared_in(text, package) or [(kind, MessageName(package, path.stem))]
+    return declared_in(text, package) or [(kind, MessageName(package, path.stem))]
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.bounds import check_extents
-from fusesoc_firm.message.idl import parse_idl
-from fusesoc_firm.message.idl_printer import to_idl
+from fusesoc_firm.message.idl.parser import parse_idl
+from fusesoc_firm.message.idl.printer import to_idl
 from fusesoc_firm.message.middleware import Definitions, MessageDefinition, Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message
 from fusesoc_firm.message.parser import parse_name

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files, is_idl
-from fusesoc_firm.message.idl import declared_in, parse_idl
+from fusesoc_firm.message.idl.names import declared_in
+from fusesoc_firm.message.idl.parser import parse_idl
 from fusesoc_firm.message.joint import INTERFACES, Language
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware, known_suffixes, middlewares
 from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message

@@ -9,7 +9,8 @@ following value.
 from functools import partial
 from types import MappingProxyType
 
-from fusesoc_firm.message import dialect, folders, idl, parser, signature, stores
+from fusesoc_firm.message import dialect, folders, parser, signature, stores
+from fusesoc_firm.message.idl.names import SUFFIX
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind
 from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
@@ -36,7 +37,7 @@ MIDDLEWARE = Middleware(
     dialect=dialect.ROS2,
     signature=signature.rihs01,
     builtin_types=dialect.ROS2.builtin_types,
-    suffixes={**{kind.value: kind for kind in InterfaceKind}, idl.SUFFIX: None},
+    suffixes={**{kind.value: kind for kind in InterfaceKind}, SUFFIX: None},
     folders=folders.ros2_folders,
     distributions=partial(stores.distributions, 2),
     store=partial(stores.DistributionStore, 2),

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.message import ROS1
-from fusesoc_firm.message.idl import parse_idl
+from fusesoc_firm.message.idl.parser import parse_idl
 from fusesoc_firm.message.middleware import Definitions, MessageDefinition, Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.parser import action_names, dialect_of, parse_message, parse_sections, service_names

@@ -69,7 +69,7 @@ def _array(
     if elements is None:
         return None
     values = [read_value(part, element, dialect, diagnostics) for part in elements]
-    if hint := _count_fault(kind, len(values)):
+    if hint := count_fault(kind, len(values)):
         diagnostics.error(f"a default value with {len(values)} elements does not fit {kind}", piece.source, hint)
         return None
     known = tuple(value for value in values if value is not None)
@@ -96,7 +96,8 @@ def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
     return elements
 
 
-def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
+def count_fault(kind: ArrayType | SequenceType, count: int) -> str:
+    """Return the legal numbers of elements if an array cannot have `count` of them, or an empty text."""
     if isinstance(kind, ArrayType):
         return "" if count == kind.length else f"legal here: exactly {kind.length} elements"
     return "" if kind.bound is None or count <= kind.bound else f"legal here: at most {kind.bound} elements"

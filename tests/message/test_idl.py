@@ -14,8 +14,9 @@ import pytest
 from rosbags.typesys import get_types_from_idl
 
 from fusesoc_firm.message import ROS2
-from fusesoc_firm.message.idl import declared_in, parse_idl
-from fusesoc_firm.message.idl_printer import to_idl
+from fusesoc_firm.message.idl.names import declared_in
+from fusesoc_firm.message.idl.parser import parse_idl
+from fusesoc_firm.message.idl.printer import to_idl
 from fusesoc_firm.message.joint import joint_text, signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MessageDefinition
@@ -330,6 +331,12 @@ BOMBS = [
     "{" * 200000,
     "@" * 200000,
     'const string A = "' + '\\"' * 100000,
+    "enum E { "
+    + ",".join(f"e{number}" for number in range(9000))
+    + " };"
+    + "".join(f"struct s{number} {{ E x; }};" for number in range(8000)),
+    "module p { module srv {" + "".join(f"struct s{number}_Request {{ long x; }};" for number in range(6000)),
+    "".join(f"struct a{number} {{ long long x; }};\n" for number in range(9000)) + "const long a;",
     "struct A { long " + ",".join(f"a{number}" for number in range(40000)) + "; }",
 ]
 

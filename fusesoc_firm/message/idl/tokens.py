@@ -54,14 +54,14 @@ class IdlText:
     def __init__(self, text: str, file: str) -> None:
         self._text = _LINE_END.sub("\n", text.removeprefix(_BYTE_ORDER_MARK))
         self._file = file
-        self._lines = [0, *(match.end() for match in re.finditer("\n", self._text))]
+        self._starts = [0, *(match.end() for match in re.finditer("\n", self._text))]
+        self._lines = self._text.split("\n")
         self.tokens = self._split()
 
     def place(self, first: Token, last: Token | None = None) -> SourceRef:
         """Return the place of the tokens `first` to `last`, or of one token."""
-        line = bisect_right(self._lines, first.start)
-        start = self._lines[line - 1]
-        text = self._text[start:].partition("\n")[0]
+        line = bisect_right(self._starts, first.start)
+        start, text = self._starts[line - 1], self._lines[line - 1]
         end = last.start + len(last.text) if last else first.start + len(first.text)
         width = max(1, min(end - start, len(text)) - (first.start - start))
         return SourceRef(self._file, line, first.start - start + 1, text, width)

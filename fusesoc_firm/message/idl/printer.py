@@ -1,4 +1,4 @@
-"""Print a message as an `.idl` file, which `idl.py` reads back as the same message.
+"""Print a message as an `.idl` file, which `parser.py` reads back as the same message.
 
 The bags that we write contain such text if a message comes from an `.idl` file, since `.msg` text cannot express the
 names and the `char` of IDL.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from fusesoc_firm.message.idl import PRIMITIVES, constants_module
+from fusesoc_firm.message.idl.names import constants_module
+from fusesoc_firm.message.idl.parser import PRIMITIVES
 from fusesoc_firm.message.middleware import Definitions, MessageDefinition
 from fusesoc_firm.message.model import (
     ArrayType,

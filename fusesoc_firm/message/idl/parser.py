@@ -1,4 +1,4 @@
-"""Parse `.idl` files and the `ros2idl` schemas of bags: the part of OMG IDL 4.2 that rosidl accepts, and enums.
+"""Parse IDL text into messages.
 
     definition = module | struct | enum | const | typedef, each with ";"
     module     = "module" name "{" { definition } "}"
@@ -17,14 +17,16 @@ type that the file does not declare is another message. After a fault, parsing c
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import TypeVar
 
+from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.dialect import IDL_NAME, LARGEST_SIZE
-from fusesoc_firm.message.idl_expression import MOST_NESTED, Cursor, Expression
-from fusesoc_firm.message.idl_tokens import IdlError, IdlText, Token
+from fusesoc_firm.message.idl.expression import MOST_NESTED, Cursor, Expression
+from fusesoc_firm.message.idl.names import Path, kind_of, message_name
+from fusesoc_firm.message.idl.scope import Declared, Enum, Scope, twice
+from fusesoc_firm.message.idl.tokens import IdlError, IdlText, Token
+from fusesoc_firm.message.idl.values import Values
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -33,7 +35,6 @@ from fusesoc_firm.message.model import (
     ElementType,
     Field,
     FieldType,
-    InterfaceKind,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -41,12 +42,11 @@ from fusesoc_firm.message.model import (
     SequenceType,
     StringType,
 )
+from fusesoc_firm.message.parser import dialect_of
 from fusesoc_firm.message.signature import ONLY_MEMBER
 from fusesoc_firm.message.unsupported import IDL_FEATURES
-from fusesoc_firm.message.values import scalar_of
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-SUFFIX = "idl"
 PRIMITIVES = {
     "boolean": PrimitiveType("bool"),
     "octet": PrimitiveType("byte"),
@@ -66,14 +66,9 @@ PRIMITIVES = {
 # On the wire, an enumerator is a number of 32 bits (DDS-XTypes 1.3, section 7.4).
 _ENUMERATOR = PrimitiveType("int32")
 _DECLARATIONS = "legal here: module, struct, enum, const, typedef"
-_KINDS = {kind.value: kind for kind in InterfaceKind}
-_PARTS = {InterfaceKind.SERVICE: ("_Request", "_Response"), InterfaceKind.ACTION: ("_Goal", "_Result", "_Feedback")}
 # The annotations of members and enumerators that are not ignored.
 _OF_MEMBERS = ("default", "optional")
 _OF_ENUMERATORS = ("value",)
-
-_Path = tuple[str, ...]
-_T = TypeVar("_T")
 
 
 def parse_idl(
@@ -91,66 +86,6 @@ def parse_idl(
     return _Parser(idl, package, ros, diagnostics).definitions()
 
 
-def declared_in(text: str, package: str) -> list[tuple[InterfaceKind, MessageName]]:
-    """Return the messages, services and actions that IDL text declares; the text is not checked."""
-    try:
-        tokens = IdlText(text, "").tokens
-    except IdlError:
-        return []
-    structs = list(_structs(tokens))
-    found = (_declared(modules, name, package, structs) for modules, name in structs)
-    return list(dict.fromkeys(found))
-
-
-def _structs(tokens: Sequence[Token]) -> Iterator[tuple[_Path, str]]:
-    """Yield the modules and the name of each struct with members."""
-    scopes: list[str | None] = []
-    for word, name, mark in zip(tokens, tokens[1:], tokens[2:], strict=False):
-        if word.text == "}" and scopes:
-            scopes.pop()
-        elif mark.text == "{" and word.text == "module":
-            scopes.append(name.text)
-        elif mark.text in ("{", ":") and word.text == "struct" and name.kind == "word":
-            yield tuple(scope for scope in scopes if scope), name.text
-        if mark.text == "{" and word.text != "module":
-            scopes.append(None)
-
-
-def _declared(
-    modules: _Path, name: str, package: str, structs: Collection[tuple[_Path, str]]
-) -> tuple[InterfaceKind, MessageName]:
-    """Return the service or action of which a struct is a part, if all its parts are declared, or else the message."""
-    kind, message = _kind_of(modules), _message_name(modules, name, package)
-    for part in _PARTS.get(kind, ()):
-        base = name.removesuffix(part)
-        if base != name and all((modules, f"{base}{other}") in structs for other in _PARTS[kind]):
-            return kind, MessageName(message.package, base)
-    return InterfaceKind.MESSAGE, message
-
-
-def _kind_of(modules: _Path) -> InterfaceKind:
-    return _KINDS.get(modules[1], InterfaceKind.MESSAGE) if len(modules) > 1 else InterfaceKind.MESSAGE
-
-
-def constants_module(struct: str) -> str:
-    """Return the name of the module with a struct's constants."""
-    return f"{struct}_Constants"
-
-
-def _message_name(modules: _Path, name: str, package: str) -> MessageName:
-    """Return the name of the message that a struct defines; modules below those of ROS are a part of the name."""
-    below = modules[2:] if len(modules) > 1 and modules[1] in _KINDS else modules[1:]
-    return MessageName(modules[0] if modules else package, "_".join((*below, name)))
-
-
-@dataclass(frozen=True)
-class _Declared:
-    """A type with a name, and the enumerators that it brings into a message."""
-
-    type: FieldType
-    enumerators: tuple[Constant, ...] = ()
-
-
 @dataclass(frozen=True)
 class _Annotation:
     """An annotation with an effect, and its value; None if it has none."""
@@ -159,17 +94,14 @@ class _Annotation:
     value: Scalar | None
 
 
-_Annotations = dict[str, _Annotation]
-
-
 @dataclass
 class _Struct:
-    """A struct: its modules, name, fields, and the enumerators of its fields."""
+    """A struct: its modules, name, fields, and the enums of its fields."""
 
-    modules: _Path
+    modules: Path
     token: Token
     fields: list[Field] = field(default_factory=list)
-    enumerators: list[Constant] = field(default_factory=list)
+    enums: dict[Enum, None] = field(default_factory=dict)
 
 
 class _Parser:
@@ -181,14 +113,10 @@ class _Parser:
         self._ros = ros
         self._diagnostics = diagnostics
         self._cursor = Cursor(text)
-        self._expression = Expression(self._cursor, self._value_of)
-        self._modules: list[str] = []
-        # The module with the constants of the struct that is parsed, in which rosidl looks up names as well.
-        self._own_constants = ""
-        self._types: dict[_Path, _Declared] = {}
-        self._constants: dict[_Path, Constant] = {}
+        self._scope = Scope(text)
+        self._expression = Expression(self._cursor, self._scope.value_of)
+        self._values = Values(text, dialect_of(ros))
         self._structs: list[_Struct] = []
-        self._places: dict[_Path, Token] = {}
 
     def definitions(self) -> dict[MessageName, MessageDefinition]:
         """Parse the whole text."""
@@ -197,8 +125,15 @@ class _Parser:
             if self._cursor.token.kind != "end":
                 self._report("unexpected '}'", self._cursor.step())
         found: dict[MessageName, MessageDefinition] = {}
+        constants = 0
         for struct in self._structs:
             definition = self._definition_of(struct)
+            constants += len(definition.constants)
+            if constants > MOST_FILE_BYTES:
+                # Many structs with a field of one large enum would exhaust the memory.
+                hint = f"legal here: up to {MOST_FILE_BYTES}"
+                self._report("the messages of the file have too many constants together", struct.token, hint)
+                break
             if definition.name in found:
                 hint = f"the first one is in line {found[definition.name].source.line}"
                 self._report(f"another struct defines the message '{definition.name}'", struct.token, hint)
@@ -206,16 +141,19 @@ class _Parser:
         return found
 
     def _definition_of(self, struct: _Struct) -> MessageDefinition:
-        scope = (*struct.modules, constants_module(struct.token.text))
-        own = [constant for path, constant in self._constants.items() if path[:-1] == scope]
-        constants = {constant.name: constant for constant in own}
-        for enumerator in struct.enumerators:
-            constants.setdefault(enumerator.name, enumerator)
-        name = _message_name(struct.modules, struct.token.text, self._package)
-        fields = () if [(item.name, item.type) for item in struct.fields] == [ONLY_MEMBER] else tuple(struct.fields)
-        source = self._text.place(struct.token)
-        kind = _kind_of(struct.modules)
-        return MessageDefinition(name, self._ros, fields, tuple(constants.values()), source, kind, is_idl=True)
+        name = struct.token.text
+        own = {constant.name: constant for constant in self._scope.constants_of(struct.modules, name)}
+        others = [constant for enum in struct.enums for constant in enum.enumerators if constant.name not in own]
+        is_empty = [(item.name, item.type) for item in struct.fields] == [ONLY_MEMBER]
+        return MessageDefinition(
+            message_name(struct.modules, name, self._package),
+            self._ros,
+            () if is_empty else tuple(struct.fields),
+            (*own.values(), *others),
+            self._text.place(struct.token),
+            kind_of(struct.modules),
+            is_idl=True,
+        )
 
     # --- declarations
 
@@ -249,30 +187,27 @@ class _Parser:
 
     def _module(self) -> None:
         name = self._name()
-        if len(self._modules) == MOST_NESTED:
+        if len(self._scope.modules) == MOST_NESTED:
             raise self._text.fault("modules are nested too deeply", name, f"legal here: up to {MOST_NESTED} levels")
         self._cursor.expect("{")
-        self._modules.append(name.text)
-        try:
+        with self._scope.within(name.text):
             self._declarations()
-        finally:
-            self._modules.pop()
         self._cursor.expect("}")
 
-    def _struct(self) -> _Declared:
+    def _struct(self) -> Declared:
         name = self._name()
-        modules = tuple(self._modules)
-        declared = _Declared(MessageType(_message_name(modules, name.text, self._package)))
+        modules = self._scope.modules
+        declared = Declared(MessageType(message_name(modules, name.text, self._package)))
         if self._cursor.token.text == ";":
-            self._types.setdefault((*modules, name.text), declared)
+            self._scope.announce(name, declared)
             return declared
         if self._cursor.token.text == ":":
             self._refuse(self._cursor.token)
-        self._declare(name)
-        self._types[*modules, name.text] = declared
+        self._scope.declare(name)
+        self._scope.announce(name, declared)
         self._cursor.expect("{")
-        self._own_constants = constants_module(name.text)
         struct = _Struct(modules, name)
+        self._scope.struct = name.text
         self._members(struct)
         self._cursor.expect("}")
         self._structs.append(struct)
@@ -300,24 +235,25 @@ class _Parser:
             name = self._name()
             kind = self._sized(declared.type)
             if name.text in known:
-                raise self._twice(name, known[name.text])
+                raise twice(self._text, name, known[name.text])
             known[name.text] = name
-            default = self._default(annotations.get("default"), kind)
-            struct.fields.append(Field(name.text, kind, source, default))
-            struct.enumerators += declared.enumerators
+            struct.fields.append(Field(name.text, kind, source, self._default(annotations.get("default"), kind)))
+            if declared.enum:
+                struct.enums[declared.enum] = None
             if not self._cursor.accept(","):
                 break
         self._cursor.expect(";")
 
-    def _enum(self) -> _Declared:
-        enum = self._name()
-        self._declare(enum)
+    def _enum(self) -> Declared:
+        name = self._name()
+        enum = Enum()
+        declared = Declared(_ENUMERATOR, enum)
+        self._scope.add_type(name, declared)
         self._cursor.expect("{")
-        enumerators: list[Constant] = []
         try:
-            self._enumerator(enumerators)
+            self._enumerator(enum.enumerators)
             while self._cursor.accept(","):
-                self._enumerator(enumerators)
+                self._enumerator(enum.enumerators)
             if self._cursor.token.text == "=":
                 self._refuse(self._cursor.token)
         except IdlError as fault:
@@ -325,23 +261,20 @@ class _Parser:
             while self._cursor.token.kind != "end" and self._cursor.token.text != "}":
                 self._cursor.step()
         self._cursor.expect("}")
-        for enumerator in enumerators:
-            self._constants[*self._modules, enum.text, enumerator.name] = enumerator
-        declared = _Declared(_ENUMERATOR, tuple(enumerators))
-        self._types[*self._modules, enum.text] = declared
+        self._scope.add_enum(name, enum)
         return declared
 
     def _enumerator(self, before: list[Constant]) -> None:
         """Parse an enumerator, whose value is the successor of the one before, and add it to `before`."""
         given = self._annotations(_OF_ENUMERATORS).get("value")
         name = self._name()
-        self._declare(name)
         value: Scalar = int(before[-1].value) + 1 if before else 0
         if given and given.value is not None:
             value = given.value
-        value = self._fitted(value, _ENUMERATOR, given.token if given else name)
-        before.append(Constant(name.text, _ENUMERATOR, value, str(value), self._text.place(name)))
-        self._constants[*self._modules, name.text] = before[-1]
+        value = self._values.scalar(value, _ENUMERATOR, given.token if given else name)
+        enumerator = Constant(name.text, _ENUMERATOR, value, str(value), self._text.place(name))
+        self._scope.add_constant(name, enumerator)
+        before.append(enumerator)
 
     def _const(self) -> None:
         first = self._cursor.token
@@ -354,9 +287,8 @@ class _Parser:
         name = self._name()
         self._cursor.expect("=")
         token = self._cursor.token
-        value = self._fitted(self._expression.read(), kind, token)
-        self._declare(name)
-        self._constants[*self._modules, name.text] = Constant(name.text, kind, value, str(value), source)
+        value = self._values.scalar(self._expression.read(), kind, token)
+        self._scope.add_constant(name, Constant(name.text, kind, value, str(value), source))
 
     def _typedef(self) -> None:
         match self._cursor.token.text:
@@ -370,34 +302,29 @@ class _Parser:
                 declared = self._type()
         while True:
             name = self._name()
-            named = _Declared(self._sized(declared.type), declared.enumerators)
-            # rosidl_adapter repeats the typedefs of a service's request for its response.
-            if self._types.get((*self._modules, name.text)) != named:
-                self._declare(name)
-            self._types[*self._modules, name.text] = named
+            self._scope.add_type(name, Declared(self._sized(declared.type), declared.enum))
             if not self._cursor.accept(","):
                 break
 
     # --- types
 
-    def _type(self, depth: int = 0) -> _Declared:
+    def _type(self, depth: int = 0) -> Declared:
         """Return the type that is next."""
         token = self._cursor.token
         if token.text in ("long", "unsigned", *PRIMITIVES):
-            return _Declared(self._primitive())
+            return Declared(self._primitive())
         if token.text in ("string", "wstring"):
             self._cursor.step()
             bound = self._size(">", "<") if self._cursor.token.text == "<" else None
-            return _Declared(StringType(token.text == "wstring", bound))
+            return Declared(StringType(token.text == "wstring", bound))
         if token.text == "sequence" and self._cursor.following.text == "<":
             return self._sequence(depth)
         self._refuse(token)
         is_absolute, words = self._cursor.scoped_name()
-        declared = self._resolved(self._types, is_absolute, words)
-        if declared:
+        if declared := self._scope.type_of(is_absolute, words):
             return declared
-        modules = words[:-1] or tuple(self._modules)
-        return _Declared(MessageType(_message_name(modules, words[-1], self._package)))
+        modules = words[:-1] or self._scope.modules
+        return Declared(MessageType(message_name(modules, words[-1], self._package)))
 
     def _primitive(self) -> PrimitiveType:
         first = self._cursor.step()
@@ -411,7 +338,7 @@ class _Parser:
             raise self._text.fault(f"'{name}' is not a type", first, f"legal here: {', '.join(PRIMITIVES)}")
         return PRIMITIVES[name]
 
-    def _sequence(self, depth: int) -> _Declared:
+    def _sequence(self, depth: int) -> Declared:
         token = self._cursor.step()
         if depth == MOST_NESTED:
             raise self._text.fault("sequences are nested too deeply", token, f"legal here: up to {MOST_NESTED} levels")
@@ -423,7 +350,7 @@ class _Parser:
             bound = self._size(">", ",")
         else:
             self._cursor.expect(">")
-        return _Declared(SequenceType(self._element(declared.type, token), bound), declared.enumerators)
+        return Declared(SequenceType(self._element(declared.type, token), bound), declared.enum)
 
     def _sized(self, kind: FieldType) -> FieldType:
         """Return the type of a declarator, after its name."""
@@ -461,29 +388,7 @@ class _Parser:
             raise self._text.fault(IDL_NAME.fault(token.text, "IDL"), token, IDL_NAME.hint)
         return token
 
-    def _declare(self, name: Token) -> None:
-        """Note a name of the current module. Raise `IdlError` if it is known."""
-        path = (*self._modules, name.text)
-        if path in self._places:
-            raise self._twice(name, self._places[path])
-        self._places[path] = name
-
-    def _twice(self, name: Token, first: Token) -> IdlError:
-        line = self._text.place(first).line
-        return self._text.fault(f"'{name.text}' is declared twice", name, f"the first declaration is in line {line}")
-
-    def _resolved(self, known: dict[_Path, _T], is_absolute: bool, words: _Path) -> _T | None:
-        """Return what a scoped name means: the declaration in the innermost module that has one."""
-        scopes = [0] if is_absolute else range(len(self._modules), -1, -1)
-        found = (known.get((*self._modules[:count], *words)) for count in scopes)
-        return next((item for item in found if item is not None), None)
-
-    def _value_of(self, is_absolute: bool, words: _Path) -> Scalar | None:
-        constant = self._resolved(self._constants, is_absolute, words)
-        constant = constant or self._resolved(self._constants, is_absolute, (self._own_constants, *words))
-        return constant.value if constant else None
-
-    def _annotations(self, effective: Collection[str] = ()) -> _Annotations:
+    def _annotations(self, effective: Collection[str] = ()) -> dict[str, _Annotation]:
         """Parse annotations, and return those with an effect here."""
         found = {}
         while self._cursor.token.text == "@":
@@ -522,48 +427,7 @@ class _Parser:
                 raise self._text.fault("expected ')' before the end of the file", token)
 
     def _default(self, given: _Annotation | None, kind: FieldType) -> DefaultValue | None:
-        if given is None or given.value is None:
-            return None
-        if isinstance(kind, ArrayType | SequenceType):
-            return self._default_elements(given, kind)
-        if isinstance(kind, MessageType):
-            hint = "only fields of primitive types can have default values"
-            raise self._text.fault(f"a field of type {kind} cannot have a default value", given.token, hint)
-        return self._fitted(given.value, kind, given.token)
-
-    def _default_elements(self, given: _Annotation, kind: ArrayType | SequenceType) -> DefaultValue:
-        """Return the elements in a text such as "(1, 2)", as rosidl writes the default of an array."""
-        values: object = None
-        if isinstance(given.value, str):
-            try:
-                values = ast.literal_eval(given.value.strip())
-            except (ValueError, SyntaxError, MemoryError, RecursionError):
-                values = None
-        element = kind.element
-        if not isinstance(values, tuple | list) or isinstance(element, MessageType):
-            raise self._text.fault(
-                f"'{given.value}' is not a value of {kind}", given.token, 'write an array as "(1, 2, 3)"'
-            )
-        most = kind.length if isinstance(kind, ArrayType) else kind.bound
-        if most is not None and (len(values) > most or (isinstance(kind, ArrayType) and len(values) != most)):
-            hint = f"legal here: {'exactly' if isinstance(kind, ArrayType) else 'at most'} {most} elements"
-            raise self._text.fault(
-                f"a default value with {len(values)} elements does not fit {kind}", given.token, hint
-            )
-        return tuple(self._fitted(value, element, given.token) for value in values)
-
-    def _fitted(self, value: Scalar, kind: ElementType, token: Token) -> Scalar:
-        """Return a value in the form of its type. Raise `IdlError` if the type has no such value."""
-        assert self._ros.dialect is not None
-        if isinstance(value, str) and isinstance(kind, PrimitiveType) and kind.is_character and len(value) == 1:
-            value = ord(value)
-        is_text = isinstance(value, str)
-        try:
-            if isinstance(kind, MessageType) or is_text != isinstance(kind, StringType):
-                raise ValueError("")
-            return scalar_of(str(value), kind, self._ros.dialect, has_quotes=False)
-        except ValueError as fault:
-            raise self._text.fault(f"'{value}' is not a value of {kind}", token, str(fault)) from None
+        return None if given is None or given.value is None else self._values.default(given.value, kind, given.token)
 
     # --- faults
 

@@ -12,7 +12,7 @@ import unicodedata
 from collections.abc import Callable
 from typing import Any
 
-from fusesoc_firm.message.idl_tokens import IdlText, Token
+from fusesoc_firm.message.idl.tokens import IdlText, Token
 from fusesoc_firm.message.model import Scalar
 
 MOST_NESTED = 32
