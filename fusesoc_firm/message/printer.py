@@ -60,6 +60,7 @@ def _scalar(value: Scalar) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        quoted = value.replace('"', '\\"')
+        # Only an `.idl` file can have line ends in a string.
+        quoted = value.replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
         return f'"{quoted}"'
     return str(value)

@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 from rosbags.typesys import get_types_from_idl
 
+from fusesoc_firm.frame.encoder import encode
+from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.idl.names import declared_in
 from fusesoc_firm.message.idl.parser import parse_idl
@@ -502,6 +504,33 @@ def _content(definition: MessageDefinition) -> list[tuple[str, str, object]]:
     declared = [(field.name, str(field.type), field.default) for field in definition.fields]
     declared += [(constant.name, str(constant.type), constant.value) for constant in definition.constants]
     return [(name, kind.replace("char", "uint8"), value) for name, kind, value in declared]
+
+
+def test_cyclone_dds_writes_the_same_bytes() -> None:
+    """An enumerator has four bytes, and a character has one."""
+    dds, types = pytest.importorskip("cyclonedds.idl"), pytest.importorskip("cyclonedds.idl.types")
+    mode = dds.make_idl_enum("Mode", "lab.Mode", {"OFF": 0, "ON": 5})
+    inner = dds.make_idl_struct("Inner", "lab.Inner", {"letter": types.char, "mode": mode, "raw": types.byte})
+    members = {
+        "on": bool,
+        "gains": types.array[types.float64, 2],
+        "some": types.sequence[inner, 2],
+        "name": types.bounded_str[9],
+        "id": types.int64,
+    }
+    tilt = dds.make_idl_struct("Tilt", "lab.Tilt", members)
+    found = [inner(letter="A", mode=mode.ON, raw=2), inner(letter="B", mode=mode.OFF, raw=3)]
+    written = tilt(on=True, gains=[1.0, 2.0], some=found, name="hi", id=7).serialize(use_version_2=False)
+    definitions, faults = parsed(
+        struct(
+            "boolean on; double gains[2]; sequence<Inner, 2> some; string<9> name; long long id;",
+            "enum Mode { OFF, @value(5) ON }; struct Inner { char letter; Mode mode; octet raw; };",
+        )
+    )
+    assert not faults
+    some = [{"letter": 65, "mode": 5, "raw": 2}, {"letter": 66, "mode": 0, "raw": 3}]
+    value = {"on": True, "gains": [1.0, 2.0], "some": some, "name": "hi", "id": 7}
+    assert encode(frame_of(NAME, definitions), value) == written
 
 
 # --- printing -------------------------------------------------------------------------------------------------------

@@ -12,11 +12,9 @@ import unicodedata
 from collections.abc import Callable
 from typing import Any
 
-from fusesoc_firm.message.idl.tokens import IdlText, Token
+from fusesoc_firm.message.idl.tokens import MOST_NESTED, Cursor, Token
 from fusesoc_firm.message.model import Scalar
 
-MOST_NESTED = 32
-"""The limit of nested modules, sequences and parentheses, which are parsed by recursion."""
 # Results of larger magnitude fit into no type; the bound also limits the time of an evaluation.
 _MOST_BITS = 64
 _BOOLEANS = {"TRUE": True, "FALSE": False}
@@ -47,62 +45,6 @@ _SIGNS: dict[str, Callable[[Any], int | float]] = {"-": operator.neg, "+": opera
 _NO_CHARACTERS = "legal here: all but the character zero and halves of surrogate pairs"
 _ESCAPE = re.compile(r"\\(?:([0-7]{1,3})|x([0-9a-fA-F]{1,2})|u([0-9a-fA-F]{1,4})|(.))")
 _ESCAPED = {"n": "\n", "t": "\t", "v": "\v", "b": "\b", "r": "\r", "f": "\f", "a": "\a"}
-
-
-class Cursor:
-    """A position in the tokens of IDL text."""
-
-    def __init__(self, text: IdlText) -> None:
-        self.text = text
-        self._position = 0
-
-    @property
-    def token(self) -> Token:
-        """The next token."""
-        return self.text.tokens[self._position]
-
-    @property
-    def last(self) -> Token:
-        """The token before the next one."""
-        return self.text.tokens[self._position - 1]
-
-    @property
-    def following(self) -> Token:
-        """The token after the next one."""
-        return self.text.tokens[min(self._position + 1, len(self.text.tokens) - 1)]
-
-    def step(self) -> Token:
-        """Return the next token and go past it, except for the end."""
-        token = self.token
-        self._position += token.kind != "end"
-        return token
-
-    def accept(self, text: str) -> bool:
-        """Go past the next token if it is this keyword or mark; return whether it was."""
-        is_next = self.token.text == text and self.token.kind in ("word", "mark")
-        self._position += is_next
-        return is_next
-
-    def expect(self, text: str) -> None:
-        """Go past this keyword or mark. Raise `IdlError` if it is not next."""
-        if not self.accept(text):
-            found = f"'{self.token.text}'" if self.token.text else "the end of the file"
-            raise self.text.fault(f"expected '{text}' before {found}", self.token)
-
-    def scoped_name(self) -> tuple[bool, tuple[str, ...]]:
-        """Return whether a name begins with `::`, and its words. Raise `IdlError` if no name is next."""
-        is_absolute = self.accept("::")
-        words = [self.word("a name")]
-        while self.accept("::"):
-            words.append(self.word("a name"))
-        return is_absolute, tuple(words)
-
-    def word(self, expected: str) -> str:
-        """Return the next word. Raise `IdlError`, with what was expected, if it is not a word."""
-        if self.token.kind != "word":
-            found = f"'{self.token.text}'" if self.token.text else "the end of the file"
-            raise self.text.fault(f"expected {expected} before {found}", self.token)
-        return self.step().text
 
 
 class Expression:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from fusesoc_firm.message.idl.expression import MOST_NESTED
-from fusesoc_firm.message.idl.tokens import IdlError, IdlText, Token
+from fusesoc_firm.message.idl.tokens import MOST_NESTED, IdlError, IdlText, Token
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 
 SUFFIX = "idl"

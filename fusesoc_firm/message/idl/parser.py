@@ -22,10 +22,10 @@ from dataclasses import dataclass, field
 
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.dialect import IDL_NAME, LARGEST_SIZE
-from fusesoc_firm.message.idl.expression import MOST_NESTED, Cursor, Expression
+from fusesoc_firm.message.idl.expression import Expression
 from fusesoc_firm.message.idl.names import Path, kind_of, message_name
 from fusesoc_firm.message.idl.scope import Declared, Enum, Scope, twice
-from fusesoc_firm.message.idl.tokens import IdlError, IdlText, Token
+from fusesoc_firm.message.idl.tokens import MOST_NESTED, Cursor, IdlError, IdlText, Token
 from fusesoc_firm.message.idl.values import Values
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import (

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 from fusesoc_firm.text.diagnostics import SourceRef
 
+MOST_NESTED = 32
+"""The limit of nested modules, sequences and parentheses, which are parsed by recursion."""
 _BYTE_ORDER_MARK = "\ufeff"
 _LINE_END = re.compile(r"\r\n?")
 # `>>` is two tokens, since it also ends a sequence of sequences.
@@ -91,3 +93,59 @@ class IdlText:
     def _fault_at(self, position: int) -> IdlError:
         found = next((mark for mark in _UNFINISHED if self._text.startswith(mark, position)), self._text[position])
         return self.fault(_UNFINISHED.get(found, f"unexpected character '{found}'"), Token("mark", found, position))
+
+
+class Cursor:
+    """A position in the tokens of IDL text."""
+
+    def __init__(self, text: IdlText) -> None:
+        self.text = text
+        self._position = 0
+
+    @property
+    def token(self) -> Token:
+        """The next token."""
+        return self.text.tokens[self._position]
+
+    @property
+    def last(self) -> Token:
+        """The token before the next one."""
+        return self.text.tokens[self._position - 1]
+
+    @property
+    def following(self) -> Token:
+        """The token after the next one."""
+        return self.text.tokens[min(self._position + 1, len(self.text.tokens) - 1)]
+
+    def step(self) -> Token:
+        """Return the next token and go past it, except for the end."""
+        token = self.token
+        self._position += token.kind != "end"
+        return token
+
+    def accept(self, text: str) -> bool:
+        """Go past the next token if it is this keyword or mark; return whether it was."""
+        is_next = self.token.text == text and self.token.kind in ("word", "mark")
+        self._position += is_next
+        return is_next
+
+    def expect(self, text: str) -> None:
+        """Go past this keyword or mark. Raise `IdlError` if it is not next."""
+        if not self.accept(text):
+            found = f"'{self.token.text}'" if self.token.text else "the end of the file"
+            raise self.text.fault(f"expected '{text}' before {found}", self.token)
+
+    def scoped_name(self) -> tuple[bool, tuple[str, ...]]:
+        """Return whether a name begins with `::`, and its words. Raise `IdlError` if no name is next."""
+        is_absolute = self.accept("::")
+        words = [self.word("a name")]
+        while self.accept("::"):
+            words.append(self.word("a name"))
+        return is_absolute, tuple(words)
+
+    def word(self, expected: str) -> str:
+        """Return the next word. Raise `IdlError`, with what was expected, if it is not a word."""
+        if self.token.kind != "word":
+            found = f"'{self.token.text}'" if self.token.text else "the end of the file"
+            raise self.text.fault(f"expected {expected} before {found}", self.token)
+        return self.step().text
