@@ -48,8 +48,13 @@ def _constant(constant: Constant) -> str:
     # A string constant has the length of its value, so its bound is not printed.
     word = _element(kind, {}) if isinstance(kind, PrimitiveType) else "wstring" if kind.is_wide else "string"
     is_character = isinstance(kind, PrimitiveType) and kind.is_character
-    value = f"'\\x{constant.value:02x}'" if is_character else _scalar(constant.value)
+    value = _literal(chr(int(constant.value))) if is_character else _scalar(constant.value)
     return f"const {word} {constant.name} = {value};"
+
+
+def _literal(character: str) -> str:
+    # rosbags reads no other characters than letters and digits.
+    return f"'{character}'" if character.isascii() and character.isalnum() else f"'\\x{ord(character):02x}'"
 
 
 def _field(field: Field, definitions: Definitions) -> list[str]:
@@ -78,7 +83,8 @@ def _default(value: DefaultValue | None) -> str:
         # Python has no literal for NaN.
         elements = [_scalar(item) if isinstance(item, float) else repr(item) for item in value]
         is_literal = not any(isinstance(item, float) and math.isnan(item) for item in value)
-        return _scalar(f"({', '.join(elements)},)" if value else "()") if is_literal else ""
+        end = "," if len(value) == 1 else ""
+        return _scalar(f"({', '.join(elements)}{end})") if is_literal else ""
     return "" if value is None else _scalar(value)
 
 
