@@ -11,7 +11,11 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
+from fusesoc_firm.builds.call.answer import Basis, load, obtain
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
+from fusesoc_firm.core.request import GeneratorCall
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS1, ROS2
@@ -52,6 +56,9 @@ COUNT, COUNT_TEXT = MessageName("lab_msgs", "Count"), "int32 to\n---\nint32 at\n
 LINE = "=" * 80
 POINT_IDL = "module geometry_msgs { module msg { struct Point { double x; double y; double z; }; }; };\n"
 JOINT_IDL = f"{LINE}\nIDL: lab_msgs/msg/Tilt\n{TILT_IDL}\n{LINE}\nIDL: geometry_msgs/msg/Point\n{POINT_IDL}"
+
+
+FIRM = GENERATORS["firm"]
 
 
 def write(path: Path, text: str) -> Path:
@@ -161,6 +168,27 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "theId" in capsys.readouterr().out
     assert main(["message", "list", "lab_msgs/*", "--path", str(tmp_path)]) == 0
     assert capsys.readouterr().out.count("Tilt.idl") == 2
+
+
+def test_a_generators_key_covers_the_file_of_its_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(tmp_path / "store"))
+    file = write(tmp_path / "project/src/lab_msgs/msg/Tilt.idl", TILT_IDL)
+    other = write(tmp_path / "project/src/lab_msgs/srv/Add.idl", ADD_IDL)
+
+    def is_stored() -> bool:
+        given = {"message": "lab_msgs/Tilt", "ros": 2, "paths": ["src"]}
+        call = GeneratorCall("firm", "me:p:a-b:1.0", str(tmp_path / "project"), given)
+        request, basis = make_request(call, FIRM.parameters, lambda _: ()), Basis("")
+        loaded = load(request, FIRM, basis)
+        assert file in loaded.inputs and other not in loaded.inputs
+        return obtain(loaded, FIRM, basis)[1].is_from_store
+
+    assert not is_stored()
+    assert is_stored()
+    other.write_text(ADD_IDL.replace("int64 sum", "int32 sum"))
+    assert is_stored()
+    file.write_text(TILT_IDL.replace("long theId", "short theId"))
+    assert not is_stored()
 
 
 # --- bags -----------------------------------------------------------------------------------------------------------

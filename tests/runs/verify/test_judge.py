@@ -7,9 +7,12 @@ import random
 import pytest
 
 from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.idl.parser import parse_idl
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.runs.verify import genpy_judge, judge, mcap_judge, rosbags_judge
 from fusesoc_firm.runs.verify.definitions import NoJudgementError
 from fusesoc_firm.runs.verify.stimuli import KINDS, Stimuli
+from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.frame.samples import AWKWARD
 from tests.runs.verify.messages import Definitions, own, standard
 
@@ -81,6 +84,13 @@ def test_ros2_is_judged_by_both_on_what_is_hard() -> None:
         judge.judge(message, definitions, values(message, definitions))
     message, definitions = own(ROS2, {**HARD, "Inner_Goal": "Outer o\n", "Last_FeedbackMessage": "Inner_Goal[<=2] g\n"})
     judge.judge(message, definitions, values(message, definitions))
+
+
+def test_names_that_only_idl_allows_are_judged_by_both() -> None:
+    text = "module lab { struct Outer { long theId; inner_part Part; }; struct inner_part { char C; }; };"
+    definitions = parse_idl(text, "lab", ROS2, "lab.idl", Diagnostics())
+    message = MessageName("lab", "Outer")
+    assert judge.judge(message, definitions, values(message, definitions)).judge == "rosbags, mcap-ros2-support"
 
 
 @pytest.mark.parametrize("at", [4, 8, 12, 13])
