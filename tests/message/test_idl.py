@@ -86,6 +86,8 @@ def test_typedefs_and_names_of_modules() -> None:
         "module sub { typedef long D; struct Deep { D d; }; };"
     )
     members = "D a; Three b; Two c; Again d; sequence<D> e; sub::D f; ::lab_msgs::msg::sub::Deep g; Alias h;"
+    deep = parsed(struct(members, before))[0][MessageName("lab_msgs", "sub_Deep")]
+    assert [str(field.type) for field in deep.fields] == ["int32"], "the innermost D"
     assert fields(struct(members, before)) == [
         "float64 a",
         "float64[3] b",

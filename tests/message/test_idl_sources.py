@@ -99,6 +99,12 @@ def test_a_msg_file_precedes_the_idl_file_of_its_name(tmp_path: Path, place: str
     assert fields(library, TILT) == ["float64 angle"]
 
 
+def test_an_idl_file_beside_a_msg_file_is_ignored(tmp_path: Path) -> None:
+    write(tmp_path / "lab_msgs/msg/Tilt.idl", TILT_IDL)
+    write(tmp_path / "lab_msgs/msg/Tilt.msg", "float64 angle\n")
+    assert own_names(MessageLibrary(ROS2, [tmp_path])) == ["lab_msgs/Tilt"]
+
+
 def test_services_and_actions(tmp_path: Path) -> None:
     """They have the messages and the hashes of `.srv` and `.action` files."""
     write(tmp_path / "idl/lab_msgs/srv/Add.idl", ADD_IDL)
@@ -221,6 +227,7 @@ SCHEMAS = [
     ("lab_msgs/msg/Tilt", f"Stop stop\n{LINE}\nMSG: lab_msgs/Stop", "lab_msgs/Stop", []),
     ("lab_msgs/msg/Tilt", f"{LINE}\nMSG: lab_msgs/msg/Tilt\nint8 a\n", "lab_msgs/Tilt", ["int8 a"]),
     ("lab_msgs/msg/Stop", "", "lab_msgs/Stop", []),
+    ("lab_msgs/msg/Stop", f"{LINE}\nMSG: lab_msgs/Other\nint8 a\n", "lab_msgs/Stop", []),
     ("lab_msgs/msg/Stop", " \n", "lab_msgs/Stop", []),
     ("geometry_msgs/msg/Point", "", "geometry_msgs/Point", ["float64 x", "float64 y", "float64 z"]),
 ]
