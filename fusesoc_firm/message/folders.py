@@ -56,7 +56,7 @@ def is_idl(path: Path) -> bool:
 
 
 def _declared(path: Path, package: str) -> list[tuple[InterfaceKind, MessageName]]:
-    """Return the interfaces in an `.idl` file, or the one that its name suggests, whose faults are reported on use."""
+    """Return the interfaces that an `.idl` file declares, or the one that its name suggests."""
     if any(path.with_suffix(f".{kind}").exists() for kind in _KINDS):
         return []  # installed packages have an .idl file for each interface, which need not be read
     kind = next((kind for kind in _KINDS if kind == path.parent.name), InterfaceKind.MESSAGE)
@@ -64,7 +64,7 @@ def _declared(path: Path, package: str) -> list[tuple[InterfaceKind, MessageName
         text = read_regular(path, MOST_FILE_BYTES).decode(errors="replace")
     except OSError:
         text = ""
-    return declared_in(text, package) or [(kind, MessageName(package, path.stem))]
+    return declared_in(text, package, (kind, MessageName(package, path.stem)))
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:

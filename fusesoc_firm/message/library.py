@@ -428,7 +428,7 @@ def _part(name: MessageName, source: _Source) -> Part:
 def _declared(language: Language, name: MessageName, text: str) -> Sequence[tuple[InterfaceKind, MessageName]]:
     """Return the interfaces that a definition in a bag declares."""
     if language is Language.IDL:
-        return declared_in(text, name.package) or [(InterfaceKind.MESSAGE, name)]
+        return declared_in(text, name.package, (InterfaceKind.MESSAGE, name))
     return [(INTERFACES.get(language, InterfaceKind.MESSAGE), name)]
 
 

@@ -200,7 +200,11 @@ def test_the_names_that_a_text_declares() -> None:
         ("msg", "p/G_Request"),
         ("action", "p/H"),
     ]
-    assert [(str(kind), str(name)) for kind, name in declared_in(text, "own")] == expected
+    expected_one = InterfaceKind.MESSAGE, NAME
+    assert [(str(kind), str(name)) for kind, name in declared_in(text, "own", expected_one)] == expected
+    for other in ("", "union Tilt switch (Mode) { case OFF: long a; }; enum Mode { OFF };", "/*"):
+        assert declared_in(other, "own", expected_one) == [expected_one]
+    assert declared_in("module m { enum Mode { OFF }; typedef long Size[3]; };", "own", expected_one) == []
     found, faults = parsed(text)
     assert not faults
     assert found[MessageName("p", "G_Request")].kind is InterfaceKind.SERVICE
@@ -348,7 +352,7 @@ BOMBS = [
 @pytest.mark.parametrize("text", BOMBS, ids=range(len(BOMBS)))
 def test_hostile_texts_are_refused_at_once(text: str) -> None:
     assert parsed(text)[1]
-    declared_in(text, "lab_msgs")
+    declared_in(text, "lab_msgs", (InterfaceKind.MESSAGE, NAME))
 
 
 # --- others read the same -------------------------------------------------------------------------------------------

@@ -6,26 +6,36 @@ from collections.abc import Collection, Iterator, Sequence
 
 from fusesoc_firm.message.idl.tokens import MOST_NESTED, IdlError, IdlText, Token
 from fusesoc_firm.message.model import InterfaceKind, MessageName
+from fusesoc_firm.message.unsupported import IDL_FEATURES
 
 SUFFIX = "idl"
 
 Path = tuple[str, ...]
 """The names of modules, from the outermost one, and possibly of a declaration in them."""
 
+# What includes of other files may need, and keywords of features that are not supported.
+_OTHER_DECLARATIONS = frozenset({"enum", "typedef", "const"})
+_UNSUPPORTED = frozenset(word for word in IDL_FEATURES if word.isalpha())
 _KINDS = {kind.value: kind for kind in InterfaceKind}
 _PARTS = {InterfaceKind.SERVICE: ("_Request", "_Response"), InterfaceKind.ACTION: ("_Goal", "_Result", "_Feedback")}
 
 
-def declared_in(text: str, package: str) -> list[tuple[InterfaceKind, MessageName]]:
+def declared_in(
+    text: str, package: str, expected: tuple[InterfaceKind, MessageName]
+) -> list[tuple[InterfaceKind, MessageName]]:
     """Return the messages, services and actions that IDL text declares; the text is not checked.
 
-    `package` is the package of structs outside all modules.
+    `package` is the package of structs outside all modules. Without a struct, the result is the `expected` interface,
+    on whose use the reason is reported; but it is empty if the text only declares types for other files.
     """
     try:
         tokens = IdlText(text, "").tokens
     except IdlError:
-        return []
+        return [expected]
     structs = dict.fromkeys(_structs(tokens))
+    if not structs:
+        words = {token.text for token in tokens}
+        return [] if words & _OTHER_DECLARATIONS and not words & _UNSUPPORTED else [expected]
     return list(dict.fromkeys(_declared(modules, name, package, structs) for modules, name in structs))
 
 
