@@ -108,6 +108,14 @@ def test_an_enum_is_a_number_and_its_constants() -> None:
     assert [(item.name, item.value) for item in found.constants] == [("M", 4), ("OFF", 0), ("ON", 4), ("AUTO", 5)]
 
 
+def test_equal_enumerators_of_two_enums_are_distinct() -> None:
+    before = "module a { enum Mode { OFF }; }; module b { enum Mode { LOW, OFF }; }; module c { enum Mode { OFF }; };"
+    found = message(struct("a::Mode a; b::Mode b; b::Mode c; c::Mode d;", before, "const long LOW = 7;"))
+    expected = [("LOW", 7), ("OFF", 0), ("Mode_LOW", 0), ("Mode_OFF", 1), ("Mode_OFF_4", 0)]
+    assert [(item.name, item.value) for item in found.constants] == expected
+    assert _content(message(to_idl(found, {}))) == _content(found)
+
+
 CONSTANTS = [
     ("long", "1 + 2 * 3", 7),
     ("long", "-(1 | 6 & 3 ^ 1)", -3),
@@ -326,6 +334,8 @@ def test_faults_of_texts(text: str, place: str, message: str) -> None:
 
 
 BOMBS = [
+    "".join(f"module m{number} {{ enum E {{ A }}; }};" for number in range(4000))
+    + f"struct S {{ {' '.join(f'm{number}::E a{number};' for number in range(4000))} any x; }};",
     "module m {" * 5000 + "};" * 5000,
     f"const long A = {'(' * 50000}1;",
     f"const long A = {'-' * 100000}'a';",

@@ -18,7 +18,7 @@ type that the file does not declare is another message. After a fault, parsing c
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.dialect import IDL_NAME, LARGEST_SIZE
@@ -104,6 +104,14 @@ class _Struct:
     enums: dict[Enum, None] = field(default_factory=dict)
 
 
+def _add_distinct(enumerator: Constant, enum: str, constants: dict[str, Constant]) -> None:
+    """Add an enumerator to the constants of a message; the name of its enum, or a number, makes its name distinct."""
+    name = enumerator.name
+    while name in constants:
+        name = f"{enum}_{name}" if name == enumerator.name else f"{name}_{len(constants)}"
+    constants[name] = replace(enumerator, name=name)
+
+
 class _Parser:
     """A recursive descent parser, which reports every fault and keeps the valid declarations."""
 
@@ -142,14 +150,16 @@ class _Parser:
 
     def _definition_of(self, struct: _Struct) -> MessageDefinition:
         name = struct.token.text
-        own = {constant.name: constant for constant in self._scope.constants_of(struct.modules, name)}
-        others = [constant for enum in struct.enums for constant in enum.enumerators if constant.name not in own]
+        constants = {constant.name: constant for constant in self._scope.constants_of(struct.modules, name)}
+        for enum in struct.enums:
+            for enumerator in enum.enumerators:
+                _add_distinct(enumerator, enum.name, constants)
         is_empty = [(item.name, item.type) for item in struct.fields] == [ONLY_MEMBER]
         return MessageDefinition(
             message_name(struct.modules, name, self._package),
             self._ros,
             () if is_empty else tuple(struct.fields),
-            (*own.values(), *others),
+            tuple(constants.values()),
             self._text.place(struct.token),
             kind_of(struct.modules),
             is_idl=True,
@@ -246,7 +256,7 @@ class _Parser:
 
     def _enum(self) -> Declared:
         name = self._name()
-        enum = Enum()
+        enum = Enum(name.text)
         declared = Declared(_ENUMERATOR, enum)
         self._scope.add_type(name, declared)
         self._cursor.expect("{")

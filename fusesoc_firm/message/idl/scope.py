@@ -16,8 +16,9 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Enum:
-    """The enumerators of an enum."""
+    """An enum: its name and its enumerators."""
 
+    name: str
     enumerators: list[Constant] = field(default_factory=list)
 
 
