@@ -23,8 +23,8 @@ module firm_sim_host #(
   parameter SEED = 1,
   // The chance per cycle and direction that the host stalls.
   parameter STALL_PERCENT = 0,
-  // Frames whose labels and latency are printed.
-  parameter SHOWN = 10,
+  // Frames whose labels and latency are printed; the default is all.
+  parameter SHOWN = 2147483647,
   // Cycles without a beat after which the host gives up on missing frames.
   parameter WATCHDOG = 100000,
   // Cycles without a beat in which it listens for surplus frames after the last expected one.

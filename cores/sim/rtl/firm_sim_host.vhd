@@ -29,8 +29,8 @@ entity firm_sim_host is
     SEED : integer := 1;
     -- The chance per cycle and direction that the host stalls.
     STALL_PERCENT : integer := 0;
-    -- Frames whose labels and latency are printed.
-    SHOWN : integer := 10;
+    -- Frames whose labels and latency are printed; the default is all.
+    SHOWN : integer := integer'high;
     -- Cycles without a beat after which the host gives up on missing frames.
     WATCHDOG : integer := 100000;
     -- Cycles without a beat in which it listens for surplus frames after the last expected one.
