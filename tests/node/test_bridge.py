@@ -80,3 +80,18 @@ def test_a_python_without_ros(ros: int, module: str, tmp_path: Path) -> None:
     python.chmod(0o755)
     with pytest.raises(CarrierError, match=f"python cannot import {module}, which ROS {ros} installs; .* install"):
         RosCarrier(ros, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))
+
+
+def test_a_middleware_that_is_not_installed_is_the_cause(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # This Python imports rclpy unless a middleware is selected.
+    python = tmp_path / "python3"
+    python.write_text('#!/bin/sh\n[ "$2" = "import rclpy" ] && [ -z "$RMW_IMPLEMENTATION" ]\n', encoding="utf-8")
+    python.chmod(0o755)
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    message = r"RMW_IMPLEMENTATION=rmw_zenoh_cpp .* is not installed: .*ros-<distribution>-rmw-zenoh-cpp"
+    with pytest.raises(CarrierError, match=message):
+        RosCarrier(2, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "")
+    with pytest.raises(CarrierError) as raised:
+        RosCarrier(2, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))
+    assert "RMW_IMPLEMENTATION" not in str(raised.value)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -23,6 +24,8 @@ from fusesoc_firm.node.interface.services import NodeService
 from fusesoc_firm.node.interface.topics import NodeTopic
 
 # For each version of ROS, a module that only the Python with that version can import.
+# The variable with which ROS 2 selects its middleware.
+_RMW = "RMW_IMPLEMENTATION"
 _MODULES = {1: "rospy", 2: "rclpy"}
 # The instructions to install ROS if it is missing.
 _INSTALLATION = {
@@ -203,6 +206,7 @@ class RosCarrier:
         if parcel is None or parcel.kind == bridge.FAULT:
             module = _MODULES[self._ros]
             if not _can_import(self._python, module):
+                _check_middleware(self._ros, [self._python])
                 raise CarrierError(
                     f"{self._python} cannot import {module}, which {self.title} installs; {_INSTALLATION[self._ros]}"
                 )
@@ -348,11 +352,25 @@ def _python_of(ros: int) -> str:
         # An installed interpreter is not sufficient, since the sourced ROS may be for another Python.
         if _can_import(path, module):
             return path
+    _check_middleware(ros, candidates)
     raise CarrierError(
         f"no Python found here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
         f" {_INSTALLATION[ros]}; if ROS is installed, source its setup file, or select its Python with --ros-python"
     )
 
 
-def _can_import(python: str, module: str) -> bool:
-    return not subprocess.run([python, "-c", f"import {module}"], capture_output=True, check=False).returncode
+def _check_middleware(ros: int, pythons: Iterable[str]) -> None:
+    """Raise `CarrierError` if the middleware in the environment is the reason why these Pythons do not import ROS 2."""
+    chosen = os.environ.get(_RMW, "")
+    without = {name: value for name, value in os.environ.items() if name != _RMW}
+    if ros == 2 and chosen and any(_can_import(path, _MODULES[ros], without) for path in pythons):
+        package = chosen.replace("_", "-")
+        raise CarrierError(
+            f"{_RMW}={chosen} in the environment selects a middleware of ROS 2 that is not installed: install it"
+            f" (package ros-<distribution>-{package}), or unset the variable: unset {_RMW}"
+        )
+
+
+def _can_import(python: str, module: str, environment: Mapping[str, str] | None = None) -> bool:
+    command = [python, "-c", f"import {module}"]
+    return not subprocess.run(command, env=environment, capture_output=True, check=False).returncode
