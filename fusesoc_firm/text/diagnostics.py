@@ -10,14 +10,18 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NoReturn
 
 # The maximum number of reported faults; a file of the wrong kind would have a fault on every line.
 _MOST_SHOWN = 200
 # The maximum number of characters shown around a fault, and the minimum length of a word that is shortened.
 _WIDEST = 200
+# The maximum number of equally near words in a hint.
+_MOST_TWINS = 3
 _LONG_WORD = re.compile(r"\S{500,}")
 
 
@@ -132,6 +136,14 @@ class Diagnostics:
         for fault in error.diagnostics:
             self.error(fault.message, fault.source or source, fault.hint)
 
+    @contextmanager
+    def noting(self, source: SourceRef | None = None) -> Iterator[None]:
+        """Add the faults that end this context, with `source` as in `take`."""
+        try:
+            yield
+        except InputError as error:
+            self.take(error, source)
+
     def raise_if_any(self) -> None:
         """Raise `InputError` with every fault, in the order of files, lines and columns."""
         if self.found:
@@ -149,14 +161,31 @@ def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoRet
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
-    """Return a hint for an unknown word: the nearest legal word, or all legal words if none is similar."""
+    """Return a hint for an unknown word: the nearest legal word, or all legal words if none is similar.
+
+    If a few words differ from it in one letter, all of them are the nearest.
+    """
     legal = sorted(set(choices))
+    if 1 < len(twins := [item for item in legal if _is_twin(word, item)]) <= _MOST_TWINS:
+        return "did you mean '" + "' or '".join(twins) + "'?"
     if near := closest(word, legal):
         return f"did you mean '{near}'?"
     if not legal:
         return ""
     shown = ", ".join(legal[:20]) + (", ..." if len(legal) > 20 else "")
     return f"legal here: {shown}"
+
+
+def _is_twin(word: str, other: str) -> bool:
+    """Return whether two words differ in one letter."""
+    return len(word) == len(other) > 1 and sum(a != b for a, b in zip(word.lower(), other.lower(), strict=True)) == 1
+
+
+def nearest_file(path: Path) -> str:
+    """Return a hint for a missing file: its missing folder, or the nearest file or all files of its kind there."""
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}"
+    return nearest(path.name, [item.name for item in path.parent.glob(f"*{path.suffix}") if item.is_file()])
 
 
 def closest(word: str, choices: Iterable[str]) -> str | None:

@@ -156,6 +156,9 @@ class _Reader:
                 return self.section(_section_type(entry), node, f"'{name}'")
             case "sections":
                 return self._sections(entry, node, name)
+            case "texts" if isinstance(node, yaml.MappingNode):
+                self._error(f"'{name}' must be a word or a list of words, not {kind(node)}", node, entry.meaning)
+                return None
             case "texts":
                 nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
                 texts = [self._text(item, entry, name) for item in nodes]

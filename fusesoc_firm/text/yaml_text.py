@@ -19,7 +19,7 @@ from typing import Any
 
 import yaml
 
-from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, byte_place, fail
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest_file
 from fusesoc_firm.text.files import read_regular
 
 MOST_LEVELS = 64
@@ -173,7 +173,8 @@ def read_yaml(
         # Some editors write a byte order mark.
         text = read_regular(path, bounds.bytes).decode("utf-8-sig")
     except OSError as error:
-        fail(f"cannot read {name}: {error.strerror}")
+        is_missing = isinstance(error, FileNotFoundError)
+        fail(f"cannot read {name}: {error.strerror}", hint=nearest_file(path) if is_missing else "")
     except UnicodeDecodeError as error:
         fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
     noted = Diagnostics() if faults is None else faults

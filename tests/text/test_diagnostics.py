@@ -63,6 +63,9 @@ def test_nothing_is_raised_without_a_fault() -> None:
     [
         ("acclerators", ["accelerators", "project"], "did you mean 'accelerators'?"),
         ("HLs", ["HLS", "VHDL"], "did you mean 'HLS'?"),
+        ("ros3", ["ROS", "ROS1", "ROS2"], "did you mean 'ROS1' or 'ROS2'?"),
+        ("in_w", ["in_a", "in_x", "in_y", "in_z"], "did you mean 'in_z'?"),
+        ("d", ["a", "b"], "legal here: a, b"),
         ("x", ["b", "a", "b"], "legal here: a, b"),
         ("x", [], ""),
         ("0", [f"key{n:02}" for n in range(30)], "legal here: " + ", ".join(f"key{n:02}" for n in range(20)) + ", ..."),
