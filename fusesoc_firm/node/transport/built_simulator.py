@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.core.core_reader import CoreFile, read_core
+from fusesoc_firm.core.core_reader import CoreFile, core_name, read_core
 from fusesoc_firm.core.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.message_sources import core_of, load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
@@ -38,6 +38,7 @@ from fusesoc_firm.tools.simulators import Live, default_simulator, fitting
 MOST_SEED, MOST_STALL_PERCENT = 2147483562, 99
 """The largest seed and percentage of stalls that a test bench accepts."""
 _SHOWN_LINES = 20
+_UNKNOWN_UNIT = re.compile(r'unit "(\w+)" not found in library "\w+"')
 
 
 @dataclass(frozen=True)
@@ -183,10 +184,30 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
         check=False,
     )
     if done.returncode:
+        _fail_for_units(spec, done.stdout)
         lines = [line for line in done.stdout.splitlines() if not line.startswith("INFO:")]
         shown = "\n".join(lines[-_SHOWN_LINES:])
         fail(f"cannot build the simulator for {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
     return done.stdout
+
+
+def _fail_for_units(spec: Path, output: str) -> None:
+    """Raise `InputError` if a build failed because the system's core does not depend on the cores of some units."""
+    if units := dict.fromkeys(_UNKNOWN_UNIT.findall(output)):
+        # The library consists of links, into which a recursive pattern does not lead.
+        roots = [path.resolve() for path in library_root().iterdir()]
+        files = [path for unit in units for root in roots for path in root.rglob(f"{unit}.vhd")]
+        cores = {str(read_core(core).data.get("name", "")) for path in files for core in _cores_of(path)}
+        options = " ".join(f"--depend {core_name(name)}" for name in sorted(cores)) or "--depend CORE for each"
+        fail(
+            f"the accelerators of {spec.name} use units of other cores: {', '.join(units)}",
+            hint=f"write a core that depends on these: firm system core {spec.name} {options}",
+        )
+
+
+def _cores_of(path: Path) -> list[Path]:
+    """Return the core files of the folder that contains a source, or of the nearest one above it."""
+    return next(([*found] for folder in path.parents if (found := sorted(folder.glob("*.core")))), [])
 
 
 def _flow(work: Path) -> Any:
