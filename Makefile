@@ -72,7 +72,7 @@ SAMPLE ?=
 MUTANTS ?=
 
 # Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip would hide error messages.
-pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
+pip_install = ./.ci/with-progress $(1)/pip.log $(1)/bin/pip install --disable-pip-version-check $(2) || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); see the message above." >&2; \
     ! grep -q "Retrying (" $(1)/pip.log || echo "The package index cannot be reached. Run make again with a network, and with a proxy if one is needed." >&2; \
     exit 1; }
