@@ -33,6 +33,8 @@ from tests.shared import SHARED
 
 pytest_plugins = ["tests.reads", "tests.reached", "tests.sharing", "tests.time_report"]
 
+# Lines of progress depend on the speed of the machine.
+os.environ["FIRM_PROGRESS"] = "no"
 settings.register_profile("untimed", deadline=None, derandomize=not os.environ.get(ROUND), database=None)
 settings.load_profile("untimed")
 

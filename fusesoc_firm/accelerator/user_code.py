@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.diagnostics import SourceRef, closest, fail
 
 _MODULE = "_user_code"
 
@@ -50,24 +50,21 @@ class UserFunction:
         for found in ([item for item in words if id(item) in keys], words, results):
             if len(found) == 1:
                 return _place_of(self.path, found[0])
-        return _place(self.path, self._line())
+        return place_in(self.path, self._line())
 
     def _line(self) -> int:
         """Return the line of the function, or 1 if the file does not define the function."""
         call = inspect.unwrap(self.call)
         method = call if inspect.isroutine(call) else inspect.getattr_static(type(call), "__call__")
         code = getattr(method, "__code__", None)
-        return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
+        return code.co_firstlineno if code is not None and code.co_filename == str(self.path.absolute()) else 1
 
 
 def load_function(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
     """Load the function `name` of a file. May raise `InputError`; `parameters` and `hint` describe the correct form."""
-    spec = importlib.util.spec_from_file_location(_MODULE, path)
+    spec = importlib.util.spec_from_file_location(_MODULE, path.absolute())
     if spec is None or spec.loader is None or not path.is_file():
-        fail(
-            f"there is no {what.removeprefix('the ')} at {path}",
-            hint=f"write a Python file (.py) with a function '{name}({parameters})'; {hint}",
-        )
+        fail_missing(path, f"{name}({parameters})", what, hint)
     module = importlib.util.module_from_spec(spec)
     # The module must be registered, since dataclasses, for example, look up their module.
     sys.modules[_MODULE] = module
@@ -81,24 +78,31 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
         sys.dont_write_bytecode = writes
     function = getattr(module, name, None)
     if not callable(function):
-        fail(f"{path} has no function '{name}({parameters})'", hint=hint)
+        fail(f"{path} has no function '{name}({parameters})'", place_in(path, 1), hint)
     return UserFunction(path, what, function)
+
+
+def fail_missing(path: Path, function: str, what: str, hint: str) -> NoReturn:
+    """Raise `InputError` for a missing file with this function."""
+    near = closest(path.name, [item.name for item in path.parent.glob("*.py")])
+    form = f"write a Python file (.py) with a function '{function}'; {hint}"
+    fail(f"there is no {what.removeprefix('the ')} at {path}", hint=f"did you mean '{near}'?" if near else form)
 
 
 def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
     """Raise `InputError` at the line of the file that caused an exception, or at line `otherwise` if unknown."""
     text = f": {error}" if str(error) else ""
     message = f"{what} raised {type(error).__name__}{when}{text}"
-    if isinstance(error, SyntaxError) and error.filename == str(path):
+    if isinstance(error, SyntaxError) and error.filename == str(path.absolute()):
         line, column = error.lineno or 1, error.offset or 1
         fail(
             f"{what} is not valid Python: {error.msg}",
             SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
         )
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path.absolute())]
     if not frames:
-        fail(message, _place(path, otherwise))
-    fail(message, _place(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
+        fail(message, place_in(path, otherwise))
+    fail(message, place_in(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
 
 
 def _own_nodes(path: Path, line: int) -> Iterator[ast.expr | ast.stmt]:
@@ -122,12 +126,13 @@ def _first_line(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -
 
 
 def _place_of(path: Path, node: ast.expr | ast.stmt) -> SourceRef:
-    place = _place(path, node.lineno)
+    place = place_in(path, node.lineno)
     # The parser counts bytes of UTF-8.
     column = len(place.text.encode()[: node.col_offset].decode()) + 1
     return replace(place, column=column)
 
 
-def _place(path: Path, line: int, column: int = 1) -> SourceRef:
+def place_in(path: Path, line: int, column: int = 1) -> SourceRef:
+    """Return a place in a user's file."""
     lines = path.read_text(encoding="utf-8").split("\n")
     return SourceRef(str(path), line, column, lines[line - 1] if line <= len(lines) else "")

@@ -59,7 +59,8 @@ def selection_of(arguments: argparse.Namespace, *, has_default: bool = False) ->
 
     revision: str | None = arguments.affected_since
     if not arguments.cores and revision is None and not has_default:
-        fail("no core is selected", hint="name cores, or add --affected-since REV")
+        hint = "name cores, or add --affected-since REV; 'firm bitstream' builds for a board"
+        fail("no core is selected", hint=hint)
     every = ("*",) if revision is not None else ()
     selection = Selection(tuple(arguments.cores) or every, tuple(arguments.targets))
     missing = [core for core, targets in selection.parts() if not targets]

@@ -7,9 +7,11 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from fusesoc_firm.text.diagnostics import closest, nearest
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.library import MessageLibrary
@@ -17,6 +19,26 @@ if TYPE_CHECKING:
     from fusesoc_firm.text.diagnostics import Diagnostic, SourceRef
 
 Handler = Callable[[argparse.Namespace], None]
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that answers a wrong word with the nearest legal one."""
+
+    def commands(self) -> dict[str, argparse.ArgumentParser]:
+        """Return the parsers of the commands or actions by name."""
+        groups = [action for action in self._actions if isinstance(action, argparse._SubParsersAction)]  # noqa: SLF001
+        return dict(groups[0].choices) if groups else {}
+
+    def refuse(self, words: Sequence[str]) -> NoReturn:
+        """End the program because of words that the parser does not know."""
+        known = self._option_string_actions
+        near = next((near for word in words if (near := closest(word.partition("=")[0], known))), None)
+        self.error(f"unrecognized arguments: {' '.join(words)}{f'; did you mean {near!r}?' if near else ''}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            hint = nearest(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"invalid choice: '{value}'; {hint}")
 
 
 def command(
@@ -30,9 +52,21 @@ def command(
         epilog=f"example: {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.set_defaults(parser=parser)
     if handler:
         parser.set_defaults(handler=handler)
     return parser
+
+
+def add_spec(parser: argparse.ArgumentParser) -> None:
+    """Add the specification as an argument; without it, the command gets that of the current folder."""
+    parser.add_argument(
+        "spec",
+        metavar="SPEC",
+        type=Path,
+        nargs="?",
+        help="the system's YAML specification, or its folder (default: that of this folder)",
+    )
 
 
 def positive(text: str) -> int:
@@ -152,3 +186,15 @@ def add_picture(parser: argparse.ArgumentParser) -> None:
         help="the file to write; .png, .pdf and .dot are legal, too (default: print the picture)",
     )
     parser.add_argument("--format", choices=("svg", "dot"), help="format of the printed picture (default: svg)")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add the option for `print_json`."""
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
+
+
+def print_json(data: object) -> None:
+    """Print data for other programs."""
+    from fusesoc_firm.text.json_text import json_text
+
+    print(json_text(data, 2))

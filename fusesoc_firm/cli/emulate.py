@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, command, core_folders, positive, print_step, print_warnings
+from fusesoc_firm.cli.common import add_sources, add_spec, command, core_folders, positive, print_step, print_warnings
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def add_emulate(commands: Any) -> None:
         "firm emulate robot.yaml",
         _emulate,
     )
-    emulate.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(emulate)
     emulate.add_argument(
         "--processor",
         choices=("zynq7000", "zynqmp"),

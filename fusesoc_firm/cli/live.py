@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from fusesoc_firm.cli.common import add_sources, command, load
+from fusesoc_firm.cli.common import add_sources, add_spec, command, load
 from fusesoc_firm.cli.simulator import add_simulator_options, built_board, built_simulator
 from fusesoc_firm.cli.studio import add_watch, watched
 from fusesoc_firm.text.diagnostics import fail
@@ -32,7 +32,7 @@ def add_live(commands: Any) -> None:
         "firm live robot.yaml --ros 1 --trace ways.csv sub:=/imu/orientation",
         _live,
     )
-    live.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(live)
     live.add_argument(
         "--ros", type=int, choices=(1, 2), help="connect only topics of this ROS version (default: all topics)"
     )

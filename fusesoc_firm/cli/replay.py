@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import command, load, positive
+from fusesoc_firm.cli.common import add_spec, command, load, positive
 from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
 from fusesoc_firm.cli.studio import add_watch, watched
 
@@ -23,7 +23,7 @@ def add_replay(commands: Any) -> None:
         "firm replay robot.yaml --in drive.bag --out answers.bag --tool verilator",
         _replay,
     )
-    replay.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(replay)
     replay.add_argument(
         "--in",
         dest="source",

@@ -7,7 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_sources, command, core_folders
+from fusesoc_firm.cli.common import add_sources, add_spec, command, core_folders
+from fusesoc_firm.cli.progress import Progress
 from fusesoc_firm.tools.simulators import default_simulator, fitting
 
 
@@ -21,7 +22,7 @@ def add_simulator(commands: Any) -> None:
         _build_simulator,
     )
     add_simulator_options(simulator)
-    simulator.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(simulator)
 
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
@@ -77,9 +78,10 @@ def _built(arguments: argparse.Namespace, target: str) -> Any:
     from fusesoc_firm.node.transport.built_simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
-    return build_simulator(
-        arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources, target=target
-    )
+    with Progress(f"building the simulator of {arguments.spec} in {arguments.tool}"):
+        return build_simulator(
+            arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources, target=target
+        )
 
 
 def _build_simulator(arguments: argparse.Namespace) -> None:

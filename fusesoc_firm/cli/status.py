@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_sources, command, load
+from fusesoc_firm.cli.common import add_sources, add_spec, command, load
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -39,7 +39,7 @@ def add_status(commands: Any) -> None:
         "firm registers robot.yaml -o registers",
         _write_registers,
     )
-    registers.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(registers)
     registers.add_argument("-o", "--output", type=Path, metavar="DIR", required=True, help="the folder to write")
     add_sources(registers)
 

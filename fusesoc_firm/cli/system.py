@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fusesoc_firm.cli.bring_up import add_bring_up
-from fusesoc_firm.cli.common import add_picture, add_sources, check_sources, command, core_folders, load, print_warnings
+from fusesoc_firm.cli.check import add_check, check_system
+from fusesoc_firm.cli.common import (
+    add_json,
+    add_picture,
+    add_sources,
+    add_spec,
+    command,
+    core_folders,
+    load,
+    print_json,
+)
 from fusesoc_firm.node.package.languages import LANGUAGES, Place
-from fusesoc_firm.text.diagnostics import Diagnostic, InputError
-from fusesoc_firm.text.json_text import json_text
-
-if TYPE_CHECKING:
-    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 def add_system(commands: Any) -> None:
@@ -24,33 +28,33 @@ def add_system(commands: Any) -> None:
     system = command(
         commands,
         "system",
-        "write and check system specifications, and generate cores, nodes and diagrams from them",
-        "firm system check robot.yaml",
+        "show systems, and write their cores, nodes and diagrams",
+        "firm system show robot.yaml",
     )
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
-    for add in (_add_new, _add_check, _add_show, _add_skeleton, _add_diagram, _add_report, _add_core, _add_node):
+    _add_new(actions)
+    add_check(actions)
+    for add in (_add_show, _add_skeleton, _add_diagram, _add_report, _add_core, _add_node):
         _add_specification(add(actions))
     _add_specification(add_bring_up(actions))
     _add_schema(actions)
 
 
 def _add_specification(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_spec(parser)
     add_sources(parser)
 
 
-def _add_json(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, for other programs")
-
-
-def _add_new(actions: Any) -> argparse.ArgumentParser:
-    return command(
+def _add_new(actions: Any) -> None:
+    new = command(
         actions,
         "new",
         "write or extend a specification by answering questions",
         "firm system new robot.yaml",
         ask_for_system,
     )
+    new.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    add_sources(new)
 
 
 def ask_for_system(arguments: argparse.Namespace) -> None:
@@ -64,88 +68,16 @@ def ask_for_system(arguments: argparse.Namespace) -> None:
         return known_names(arguments.spec, paths, sources, core_folders)
 
     if arguments.spec.exists():
-        _check_system(arguments)
+        check_system(arguments)
     extend_specification(arguments.spec, asker(), names)
-    _check_system(arguments)
-
-
-def _add_check(actions: Any) -> argparse.ArgumentParser:
-    check = command(actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check)
-    check.add_argument(
-        "--stimuli",
-        type=Path,
-        metavar="F",
-        action="append",
-        default=[],
-        help="check also that the system accepts all messages in a YAML file or bag; may be repeated",
-    )
-    _add_json(check)
-    return check
-
-
-def _check(arguments: argparse.Namespace) -> None:
-    if arguments.json:
-        _check_as_json(arguments)
-    else:
-        _check_system(arguments, arguments.stimuli)
-
-
-def _check_as_json(arguments: argparse.Namespace) -> None:
-    """Print whether a specification is valid, and all faults and warnings; exit with 1 if it is not valid."""
-    from fusesoc_firm.fabric.ethernet import ethernet_node
-    from fusesoc_firm.fabric.ros1 import memory_of
-
-    faults: Sequence[Diagnostic] = ()
-    warnings: Sequence[Diagnostic] = ()
-    try:
-        loaded = load(arguments)
-        warnings = loaded.warnings
-        warnings += check_sources(loaded, arguments.spec)
-        _check_stimuli(loaded, arguments.stimuli)
-        memory_of(loaded.system, loaded.libraries)
-        ethernet_node(loaded.system, loaded.libraries)
-    except InputError as error:
-        faults = error.diagnostics
-    _print_json({"valid": not faults, "diagnostics": [item.data() for item in (*faults, *warnings)]})
-    if faults:
-        sys.exit(1)
-
-
-def _check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
-    from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
-    from fusesoc_firm.fabric.ros1 import memory_of
-    from fusesoc_firm.system.views.show import counts, default_lengths
-
-    loaded = load(arguments)
-    print_warnings(check_sources(loaded, arguments.spec))
-    system = loaded.system
-    _check_stimuli(loaded, stimuli)
-    memory = memory_of(system, loaded.libraries)
-    node = ethernet_node(system, loaded.libraries)
-    print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
-    for line in default_lengths(system):
-        print(line)
-    if memory:
-        print(f"the node needs {len(memory)} bytes of memory for its program and texts")
-    if node:
-        print(f"the node needs {history_bytes(system, node)} bytes of memory for the last messages of its publishers")
-    if node and (size := fragment_bytes(system, node)):
-        print(f"the node needs {size} bytes of memory for messages in several packets")
-
-
-def _check_stimuli(loaded: LoadedSystem, paths: Iterable[Path]) -> None:
-    """Raise `InputError` for the first file with a message that the system does not accept."""
-    from fusesoc_firm.runs.simulation.software_run import system_stimuli
-
-    for path in paths:
-        system_stimuli(path, loaded)
+    check_system(arguments)
 
 
 def _add_show(actions: Any) -> argparse.ArgumentParser:
     show = command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
-    _add_json(show)
+    add_json(show)
     return show
 
 
@@ -155,7 +87,7 @@ def _show_system(arguments: argparse.Namespace) -> None:
 
     description = derived_description(load(arguments).system)
     if arguments.json:
-        _print_json(description)
+        print_json(description)
     else:
         print(yaml_dump(description), end="")
 
@@ -229,7 +161,7 @@ def _add_report(actions: Any) -> argparse.ArgumentParser:
         metavar="F",
         help="the stimuli of the page (default: stimuli.yaml beside the specification, if it exists)",
     )
-    _add_json(report)
+    add_json(report)
     return report
 
 
@@ -241,7 +173,7 @@ def _report_system(arguments: argparse.Namespace) -> None:
         return
     counted = report(arguments.spec, load(arguments))
     if arguments.json:
-        _print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
+        print_json({**asdict(counted), "generated": counted.generated, "ratio": counted.ratio})
     else:
         print(counted, end="")
 
@@ -370,8 +302,4 @@ def _print_schema(_: argparse.Namespace) -> None:
     from fusesoc_firm.system.written.specification import Specification
     from fusesoc_firm.text.yaml_schema import json_schema
 
-    _print_json(json_schema(Specification, "System specification of fusesoc_firm"))
-
-
-def _print_json(data: object) -> None:
-    print(json_text(data, 2))
+    print_json(json_schema(Specification, "System specification of fusesoc_firm"))

@@ -65,8 +65,8 @@ class MessageFolders:
 class Request:
     """A generator call with checked parameters, from the core in the folder `files_root`, for the new core `vlnv`.
 
-    `places` contains the places of list parameters' items, if known; they are not part of the key. `message_folders`
-    finds the folders of the message cores in the request or its specification.
+    `places` contains the places of values, or of the items of lists, if known; they are not part of the key.
+    `message_folders` finds the folders of the message cores in the request or its specification.
     """
 
     command: str
@@ -87,6 +87,10 @@ class Request:
         assert isinstance(items, list)
         places = self.places.get(parameter, ())
         return dict(zip(items, places if len(places) == len(items) else [None] * len(items), strict=True))
+
+    def place(self, parameter: str) -> SourceRef | None:
+        """Return the place of a parameter's value, or None if it is unknown."""
+        return next(iter(self.places.get(parameter, ())), None)
 
     def definition_folders(self) -> list[Path]:
         """Return the folders in `paths`, then those of the cores in `messages`. May raise `InputError`."""

@@ -12,16 +12,19 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.core.core_reader import CoreFile, read_core
+from fusesoc_firm.core.core_reader import CoreFile, pair_of, read_core
 from fusesoc_firm.core.request import CoreFolders, no_core_folders
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.system.written.specification import Draft
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest_file
+from fusesoc_firm.text.yaml_text import read_yaml
 
 # The generator instance that generates the system.
 _INSTANCE = "system"
+# The keys of a specification at its top level.
+_KEYS = ("project", "blocks")
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,36 @@ def core_of(spec: Path) -> CoreFile | None:
             if made and os.path.realpath(path.parent / str(made)) == str(spec):
                 return core
     return None
+
+
+def cores_in(folder: Path, instance: str = _INSTANCE) -> list[Path]:
+    """Return the core files in a folder that have a generator instance with this name. May raise `InputError`."""
+    return [path for path in sorted(folder.glob("*.core")) if instance in read_core(path).section("generate")]
+
+
+def specs_in(folder: Path) -> list[Path]:
+    """Return the specifications of the cores in a folder, or else the YAML files with the keys of a specification.
+
+    May raise `InputError`.
+    """
+    if found := dict.fromkeys(spec for core in cores_in(folder) if (spec := spec_of(core))):
+        return [*found]
+    alone = []
+    for path in sorted(folder.glob("*.yaml")):
+        # Faults in unrelated files are not of interest.
+        with suppress(InputError):
+            root = read_yaml(path).root
+            alone += [path] if all(pair_of(root, key) for key in _KEYS) else []
+    return alone
+
+
+def check_specs_of(folder: Path) -> None:
+    """Raise `InputError` for the first core file in a folder that names a missing specification."""
+    for path in sorted(folder.glob("*.core")):
+        spec, core = spec_of(path), read_core(path)
+        item = core.item("generate", _INSTANCE, "parameters", "spec")
+        if spec and item and not spec.is_file():
+            fail(f"there is no specification {spec}", core.source(item[1]), nearest_file(spec))
 
 
 def spec_of(core: Path) -> Path | None:

@@ -68,7 +68,7 @@ from fusesoc_firm.system.written.specification import (
     is_core,
     read_specification,
 )
-from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail, nearest_file
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import render
 from fusesoc_firm.text.yaml_text import Text
@@ -189,8 +189,11 @@ def load_requested(request: Request) -> LoadedSystem:
     """Return the system of a generator call."""
     board = _board(request)
     given = {name: str(value) for name in _REPLACING if (value := request.parameters.get(name))}
+    path = specification_path(request)
+    if not path.is_file():
+        fail(f"there is no specification {path}", request.place("spec"), nearest_file(path))
     loaded = load_system(
-        specification_path(request),
+        path,
         libraries(*library_sources(request)),
         changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,

@@ -92,7 +92,7 @@ def edit(old: str, new: str, path: str = "rtl/img.vhd") -> None:
 
 
 def checked(capsys: Captured) -> str:
-    """What `firm system check` reports."""
+    """What `firm check` reports."""
     capsys.readouterr()
     status = main(["system", "check", "img.yaml"])
     found = capsys.readouterr().err

@@ -6,6 +6,7 @@ import argparse
 import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -67,7 +68,11 @@ def test_a_relative_path_leads_to_the_same_folder(
     [
         [],
         ["init"],
+        ["check"],
+        ["bitstream"],
+        ["load"],
         ["sim"],
+        ["help"],
         ["completion"],
         ["path"],
         ["message"],
@@ -107,16 +112,60 @@ def test_every_command_has_help_with_an_example(command: list[str], capsys: Capt
     assert not command or "example: " in text
 
 
-def test_the_commands_of_the_first_hour_come_first(capsys: Captured) -> None:
+def test_the_first_screen_has_the_commands_of_the_first_hour(capsys: Captured) -> None:
     with pytest.raises(SystemExit, match="0"):
         main(["--help"])
     text = capsys.readouterr().out
-    places = [
-        text.index(f"\n{word}") for word in ("start:\n  init ", "  system ", "run:\n  sim ", "  live ", "  replay ")
-    ]
-    assert places == sorted(places)
-    assert places[-1] < text.index("\nlook:") < text.index("\nbuild:") < text.index("\nmore:")
-    assert "  scheduler " in text
+    first = [name for names in cli.GROUPS.values() for name in names]
+    assert re.findall(r"^  (\w+)  ", text, re.MULTILINE) == first
+    assert len(first) <= 10 and first[:3] == ["init", "check", "sim"]
+    with pytest.raises(SystemExit, match="2"):
+        main([])
+    assert capsys.readouterr().err == text
+
+
+def test_help_describes_every_command(capsys: Captured) -> None:
+    listed = re.findall(r"^  (\S+)  ", out(capsys, "help", "--all"), re.MULTILINE)
+    assert sorted(listed) == sorted(cli._MODULES)
+    for words in ([], ["sim"], ["system", "show"], ["run"]):
+        with pytest.raises(SystemExit, match="0"):
+            main(["help", *words])
+        text = capsys.readouterr().out
+        with pytest.raises(SystemExit, match="0"):
+            main([*words, "--help"])
+        assert capsys.readouterr().out == text
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["chek"], "did you mean 'firm check'?"),
+        (["simulat"], "did you mean 'firm sim'?"),
+        (["validate"], "did you mean 'firm check'?"),
+        (["valdate"], "did you mean 'firm check'?"),
+        (["synth"], "did you mean 'firm bitstream'?"),
+        (["flash"], "did you mean 'firm load --flash'?"),
+        (["waves"], "did you mean 'firm sim --waves'?"),
+        (["VERIFY"], "did you mean 'firm message verify' or 'firm cache verify' or 'firm check'?"),
+        (["skeleton", "robot.yaml"], "did you mean 'firm system skeleton'?"),
+        (["frobnicate"], "'firm help --all' lists all commands"),
+        (["sim", "--tol", "ghdl"], "unrecognized arguments: --tol; did you mean '--tool'?"),
+        (["sim", "--tool", "verilatr"], "invalid choice: 'verilatr'; did you mean 'verilator'?"),
+        (["live", "--trce", "x"], "did you mean '--trace'?"),
+        (["system", "chek"], "invalid choice: 'chek'; did you mean 'check'?"),
+        (["message", "show", "a/B", "--ros", "3"], "invalid choice: '3'; legal here: 1, 2"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_misspelt_word_gets_its_nearest(words: list[str], hint: str, capsys: Captured) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(words)
+    assert hint in capsys.readouterr().err
+
+
+def test_other_names_are_the_same_commands() -> None:
+    commands = cli.parser_of(cli._MODULES).commands()
+    assert all(commands[alias] is commands[name] for alias, name in cli.ALIASES.items())
 
 
 def test_a_command_is_declared_by_the_module_that_is_loaded_for_it() -> None:
@@ -136,7 +185,10 @@ def test_a_command_loads_no_other_command() -> None:
     assert not {"yaml", "numpy", "rosbags", "fusesoc"} & {*modules.split()}
 
 
-@pytest.mark.parametrize(("line", "words"), [("firm ini", ["init"]), ("firm sim --tool ver", ["verilator"])])
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [("firm ini", ["init"]), ("firm sim --tool ver", ["verilator"]), ("firm run --tool ver", ["verilator"])],
+)
 def test_a_shell_completes(tmp_path: Path, line: str, words: list[str]) -> None:
     answer = tmp_path / "answer"
     environment = os.environ | {

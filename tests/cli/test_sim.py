@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.builds.setup.outcome import Build
-from fusesoc_firm.builds.setup.simulation import Simulation
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.common import coloured
-from fusesoc_firm.cli.sim import _print_errors
+from fusesoc_firm.cli.failed_build import print_errors
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import artifacts
 
@@ -57,7 +56,7 @@ def test_a_tools_messages_name_the_users_files(capsys: Captured) -> None:
     shutil.copy("img/rtl/img.v", work / "src/robot_sys_img_0.1.0/rtl/img.v")
     build = Build("robot:sys:img:0.1.0", "sim_icarus", work)
     build.log.write_text(LOG.format(line=line), encoding="utf-8")
-    _print_errors(Simulation(Path("img/img.core"), build, "icarus", (), None), Path("img"), loaded)
+    print_errors(build, Path("img"), loaded)
     place = next(block.name.source for block in loaded.specification.blocks if block.name == "img")
     assert capsys.readouterr().err.splitlines() == [
         "img/rtl/img.v:12: error: Unable to bind wire",
@@ -73,7 +72,7 @@ def test_a_violated_rule_of_a_stream_is_told(capsys: Captured) -> None:
     build = Build("robot:sys:img:0.1.0", "sim", work)
     rule = "firm_axis_checker.vhd:84:5:@1290ns:(assertion failure): firm_axis_checker: to the host: known: a bit"
     build.log.write_text(f"seed 1, stalls\n{rule}\nghdl:error: assertion failed\n", encoding="utf-8")
-    _print_errors(Simulation(Path("img/img.core"), build, "ghdl", (), None), None, None)
+    print_errors(build, None, None)
     assert capsys.readouterr().err.splitlines()[0] == rule
 
 

@@ -1,6 +1,6 @@
 """Every key of every shipped specification: omitted, misspelt, indented differently, and as the end of the file.
 
-`firm system check` must report the fault at its place, with the key's name, and a valid text must give a system.
+`firm check` must report the fault at its place, with the key's name, and a valid text must give a system.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of `firm system check` for a text."""
+    """The result of `firm check` for a text."""
 
     text: str
     code: int
@@ -64,7 +64,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Checker:
-    """Runs `firm system check` on variants of a specification, next to its sources."""
+    """Runs `firm check` on variants of a specification, next to its sources."""
 
     path: Path
     message_paths: Sequence[Path]
@@ -118,7 +118,7 @@ def checker(
 
     monkeypatch.setattr("fusesoc_firm.system.message_sources.libraries", shared)
     # A specification may be right and no longer fit its accelerators; tests/accelerator compares these.
-    monkeypatch.setattr("fusesoc_firm.cli.system.check_sources", lambda *_: ())
+    monkeypatch.setattr("fusesoc_firm.cli.check.check_all", lambda *_: ())
     own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
     return Checker(folder / spec.name, own, capsys)
 

@@ -46,6 +46,8 @@ OTHER_FAULTS = {
     ("system/scaffold/project.py", "_check_topics"): "options of the command line",
     ("system/scaffold/example.py", "example_named"): "options of the command line",
     ("system/scaffold/wizard.py", "extend_specification"): "a file that is extended, in test_wizard",
+    ("system/message_sources.py", "check_specs_of"): "the file of a core",
+    ("system/system_core.py", "load_requested"): "the file of a core",
     ("system/register_files.py", "write_register_files"): "a right specification without a status",
     ("system/derived/status.py", "_check_id"): "a system of 256 converters, in test_status",
     ("system/derived/status.py", "_check_channels"): "a system of 4,097 converters, in test_status",

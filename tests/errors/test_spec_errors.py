@@ -20,7 +20,7 @@ SPECIFICATIONS = sorted(FOLDER.glob("*.yaml"))
 def derive_file(
     path: Path, libraries: dict[Middleware, MessageLibrary], monkeypatch: pytest.MonkeyPatch
 ) -> DerivedSystem:
-    """The system of one of `SPECIFICATIONS`, as `firm system check` derives it."""
+    """The system of one of `SPECIFICATIONS`, as `firm check` derives it."""
     monkeypatch.chdir(FOLDER)  # so that the messages show relative paths
     return load_system(Path(path.name), libraries).system
 

@@ -1,4 +1,4 @@
-"""Time that a large system takes: `firm system check`, and FuseSoC's call of the generator `far`."""
+"""Time that a large system takes: `firm check`, and FuseSoC's call of the generator `far`."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _generate(folder: Path) -> Sequence[str]:
 
 
 JOBS = (
-    Job("firm system check", 2.0, _check),
+    Job("firm check", 2.0, _check),
     Job("generation, cold", 5.0, _generate, is_cold=True),
     Job("generation, from the store", None, _generate),
 )

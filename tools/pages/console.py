@@ -141,8 +141,8 @@ class Session:
             programs = f"{Path(sys.executable).parent}:{programs}"
         home = self.folder / ".home"
         home.mkdir(exist_ok=True)
-        kept |= {"PAGE_STATE": str(self._state)}
-        return kept | {"PATH": programs, "HOME": str(home), "COLUMNS": "100", "PYTHONUNBUFFERED": "1"}
+        further = {"COLUMNS": "100", "PYTHONUNBUFFERED": "1", "FIRM_PROGRESS": "no", "PAGE_STATE": str(self._state)}
+        return kept | {"PATH": programs, "HOME": str(home), **further}
 
     @property
     def _state(self) -> Path:

@@ -29,6 +29,8 @@ def make_request(call: GeneratorCall, parameters: Iterable[Parameter], find: Cor
     origin = find_requesting_core(folder, call.vlnv.split(":")[2])
     checked = check_parameters(call.parameters, parameters, origin)
     places = {name: origin.items(name, value) for name, value in checked.items() if isinstance(value, list)}
+    for name in call.parameters.keys() - places.keys():
+        places[name] = [place for place in [origin.value(name, checked[name])] if place]
     request = Request(call.generator, call.vlnv, folder, checked, places, MessageFolders(find))
     faults = Diagnostics()
     for name, source in request.listed("messages").items():

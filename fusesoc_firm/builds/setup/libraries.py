@@ -7,6 +7,7 @@ version that the solver rejects, a virtual name that is not a name, an alias tha
 from __future__ import annotations
 
 import operator
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -23,6 +24,9 @@ from fusesoc_firm.text.outputs import shown
 from fusesoc_firm.tools.library_path import LINK, link_library
 
 _RELATIONS = {"==": operator.eq, ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
+_LIBRARY = re.compile(r"\[library\.(.+)\]")
+_ITEM = re.compile(r"\s*([\w-]+)\s*[=:]\s*(.*\S)")
+_OWN_PLACE = "write the path that 'firm path' prints"
 _QUOTED = re.compile(r"'([^']+)'")
 
 
@@ -33,7 +37,32 @@ def open_libraries(config: Any = None) -> Any:
     _prepare()
     config = configuration() if config is None else config
     _link_library(config)
+    check_locations()
     return Fusesoc(config)
+
+
+def check_locations() -> None:
+    """Raise `InputError` if a library in the current folder's `fusesoc.conf` is in a folder that does not exist.
+
+    FuseSoC would report only that dependencies conflict. The user's own configuration may list deleted projects.
+    """
+    path = Path(os.environ.get("FUSESOC_CONFIG") or "fusesoc.conf")
+    faults, section = Diagnostics(), ""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
+    found: dict[tuple[str, str], tuple[str, SourceRef]] = {}
+    for number, line in enumerate(lines, start=1):
+        if head := _LIBRARY.fullmatch(line.strip()):
+            section = head[1]
+        elif line.lstrip().startswith("["):
+            section = ""
+        elif section and (item := _ITEM.match(line)):
+            found[section, item[1]] = item[2], SourceRef(str(path), number, item.start(2) + 1, line, len(item[2]))
+    for (name, key), (place, source) in found.items():
+        is_fetched = (name, "sync-uri") in found
+        if key == "location" and not is_fetched and not (path.parent / place).is_dir():
+            hint = _OWN_PLACE if name == "firm" or place.endswith("fusesoc_firm/library") else "correct the path"
+            faults.error(f"library '{name}' is in {place}, which does not exist on this machine", source, hint)
+    faults.raise_if_any()
 
 
 def main() -> None:
@@ -49,7 +78,7 @@ def _link_library(config: Any) -> None:
     places = [Path(library.location) for library in config.libraries]
     for place in places:
         if place.parts[-len(LINK.parts) :] == LINK.parts:
-            # FuseSoC reports a link that is missing and cannot be written.
+            # A link that is missing and cannot be written is reported with its place in fusesoc.conf.
             with suppress(OSError):
                 link_library(place.parents[len(LINK.parts) - 1])
 
@@ -127,7 +156,7 @@ def unsolved(fusesoc: Any, top: Any, flags: Mapping[str, Any]) -> list[Diagnosti
         for depend in _depends(fusesoc, chain.core, {**flags, "is_toplevel": chain.core is top}, faults):
             known = providers.get(depend.vln_str(), [])
             if (found := newest(depend.depstr(), known)) is None:
-                source, hint = _place(chain.core, _bare(depend)), _hint(fusesoc, depend, known)
+                source, hint = core_place(chain.core, _bare(depend)), _hint(fusesoc, depend, known)
                 through = f"needed by {' -> '.join(chain.names)}"
                 faults.error(_unsatisfied(depend, known), source, f"{through}; {hint}" if hint else through)
             elif found not in chains:
@@ -190,10 +219,11 @@ def core_fault(core: Any, error: SyntaxError) -> Diagnostic:
     """Return FuseSoC's fault about the content of a core as a fault at the place of the first name in its message."""
     message = str(error.msg).removeprefix(f"{core.name} : ")
     named = _QUOTED.search(message)
-    return Diagnostic(message, _place(core, named[1] if named else ""))
+    return Diagnostic(message, core_place(core, named[1] if named else ""))
 
 
-def _place(core: Any, word: str) -> SourceRef | None:
+def core_place(core: Any, word: str) -> SourceRef | None:
+    """Return the place of the first text with a word in the file of a core, or None if it cannot be read."""
     path = Path(core.core_file)
     try:
         source = read_core(path).place_of(word)

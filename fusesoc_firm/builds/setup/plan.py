@@ -15,7 +15,7 @@ from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
 from fusesoc_firm.builds.step.bench import SIMULATORS
 from fusesoc_firm.core.request import GeneratorCall
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, closest
 
 TESTS = ("sim", "test")
 """The beginnings of the names of tests."""
@@ -217,7 +217,10 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if targets and fitting else ""
-        hint = ignored(fusesoc, core) or listed or "'fusesoc core list' lists all cores"
+        short = {item.split(":")[2]: item.rpartition(":")[0] for item in fusesoc.get_cores()}
+        near = closest(core.split(":")[2] if core.count(":") > 1 else core, short)
+        meant = f"did you mean '{short[near]}'? " if near else ""
+        hint = ignored(fusesoc, core) or meant + (listed or "'fusesoc core list' lists all cores")
         faults.error(f"unknown core '{core}'", hint=hint)
         return None
 
@@ -229,7 +232,9 @@ def _flags(
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:
-        faults.error(f"{name} has no target '{target}'", hint=f"its targets: {', '.join(known) or 'none'}")
+        near = closest(target, known)
+        meant = f"did you mean '{near}'? " if near else ""
+        faults.error(f"{name} has no target '{target}'", hint=f"{meant}its targets: {', '.join(known) or 'none'}")
         return None
     flags = {**core.get_flags(target), "target": target, **further}
     if not core.get_flow(flags) and "tool" not in flags:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.builds.setup.libraries import open_libraries
-from fusesoc_firm.builds.setup.outcome import Build, configuration
+from fusesoc_firm.builds.setup.logged_run import add_libraries, run_logged
+from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.setup.plan import make_plan
 from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.text.diagnostics import fail
-from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import explanation, missing, simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS, Simulator
 
-_LIBRARY_CORE = "robot:firm:firm_system"
 _MESSAGE = re.compile(r" *(\d+) > (\S+) \S+ ?(.*)")
 _RESPONSE = re.compile(r" +< (\S+) \S+ ?(.*)")
 _CYCLES = re.compile(r" +(\d+) cycles first beat in to last beat out, (-?\d+) last beat in to first beat out")
@@ -118,42 +113,21 @@ class Simulation:
 
     def run(self, tell: Callable[[str, Report], None]) -> Report:
         """Run FuseSoC, call `tell` for each line with the report so far, and return the report."""
-        self.build.log.parent.mkdir(parents=True, exist_ok=True)
-        os.environ.setdefault("EDALIZE_LAUNCHER", shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
-        environment = os.environ | {"MAKEFLAGS": "--no-print-directory", "PYTHONUNBUFFERED": "1"}
-        code = "from fusesoc_firm.builds.setup.libraries import main; main()"
-        command = [sys.executable, "-c", code, "--monochrome", "run", f"--target={self.build.target}"]
         report = Report()
         # Frames of an earlier run must not be read as received in this one.
         (self.build.work_root / "received.txt").unlink(missing_ok=True)
-        with (
-            self.build.log.open("w", encoding="utf-8") as log,
-            subprocess.Popen(
-                [*command, self.build.core, *self.options],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                errors="backslashreplace",
-            ) as process,
-        ):
-            assert process.stdout
-            for line in process.stdout:
-                log.write(line)
-                report.add(line.rstrip())
-                tell(line.rstrip(), report)
-        report.status = process.returncode
+
+        def take(line: str) -> None:
+            report.add(line)
+            tell(line, report)
+
+        report.status = run_logged(self.build, (), self.options, take)
         return report
 
 
-def core_name(path: Path, *, is_system: bool = False) -> str:
-    """Return the name of a core; with `is_system`, an empty name unless it generates a simulation.
-
-    May raise `InputError`.
-    """
-    core = read_core(path)
-    return str(core.data.get("name", "")) if not is_system or "simulation" in core.section("generate") else ""
+def core_name(path: Path) -> str:
+    """Return the name of a core. May raise `InputError`."""
+    return str(read_core(path).data.get("name", ""))
 
 
 def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
@@ -161,7 +135,7 @@ def simulation(core: str, folder: Path | None, wishes: Wishes) -> Simulation:
 
     Raise `InputError` if the core or the tool is unknown, or if a program is missing.
     """
-    _add_libraries(core, folder)
+    add_libraries(core, folder)
     plan = make_plan([core], ["sim"])
     found = plan.fusesoc.get_core(plan.builds[0].core)
     targets = _targets(found)
@@ -200,18 +174,3 @@ def _targets(core: Any) -> dict[str, str]:
     names = [name for name in targets if name == "sim" or name.startswith("sim_")]
     tools = {name: str((getattr(targets[name], "flow_options", None) or {}).get("tool", "")) for name in sorted(names)}
     return {name: tool for name, tool in tools.items() if tool in SIMULATORS}
-
-
-def _add_libraries(core: str, folder: Path | None) -> None:
-    """Add our library and `folder` to FuseSoC's libraries, for this process and those that it starts, if missing."""
-    known = {name.rpartition(":")[0] for name in open_libraries().get_cores()}
-    places = [library_root()] if _LIBRARY_CORE not in known else []
-    if folder and core.rpartition(":")[0] not in known and core not in known:
-        places.append(folder.resolve())
-    if places:
-        former = os.environ.get("FUSESOC_CORES")
-        os.environ["FUSESOC_CORES"] = ":".join([*([former] if former else []), *map(str, places)])
-        # A library that contains the builds must not provide their generated cores.
-        root = Path(configuration().build_root)
-        root.mkdir(parents=True, exist_ok=True)
-        (root / "FUSESOC_IGNORE").touch()

@@ -51,7 +51,7 @@ def vhdl_sources(name: str, folder: Path) -> VhdlSources:
     from fusesoc.coremanager import DependencyError
 
     try:
-        fusesoc = _with_libraries(name, folder)
+        fusesoc = with_libraries(name, folder)
         core = fusesoc.get_core(name)
         targets = core.get_data({}).targets
         target = next(item for item in ("sim", *targets) if item in targets)
@@ -72,7 +72,7 @@ def vhdl_sources(name: str, folder: Path) -> VhdlSources:
     return VhdlSources(present, standards[0] if standards else "", options, is_complete, fusesoc)
 
 
-def _with_libraries(name: str, folder: Path) -> Any:
+def with_libraries(name: str, folder: Path) -> Any:
     """Return a FuseSoC instance that knows our library and the core in `folder`."""
     from fusesoc.librarymanager import Library
 

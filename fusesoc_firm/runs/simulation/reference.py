@@ -22,7 +22,9 @@ from fusesoc_firm.runs.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import nearest
 
-_ANSWER = "'respond' must return a list of (publisher, message), where the message is a mapping of fields"
+NAME, PARAMETERS = "respond", ("subscriber", "message")
+ANSWER = "'respond' must return a list of (publisher, message), where the message is a mapping of fields"
+"""The name and the parameters of a model's function, and the form of its answer."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,24 @@ class Response:
     cause: int | None
 
 
+def load_model(path: Path) -> UserFunction:
+    """Return the function of the model in `path`. May raise `InputError`."""
+    return load_function(path, NAME, "the model", ", ".join(PARAMETERS), ANSWER)
+
+
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topic]) -> list[Response]:
     """Return the responses of the model in `path` to all stimuli. May raise `InputError`, also for faults in the model.
 
     The model may respond for each of `publishers`.
     """
-    model = _Model(load_function(path, "respond", "the model", "subscriber, message", _ANSWER))
+    return answers(load_model(path), stimuli, publishers, [item.block for item in publishers])
+
+
+def answers(
+    respond: UserFunction, stimuli: Sequence[Stimulus], publishers: Sequence[Topic], names: Sequence[str]
+) -> list[Response]:
+    """Return the responses of a model like `responses`; its faults suggest only these `names` of publishers."""
+    model = _Model(respond, names)
     known = {publisher.block: publisher for publisher in publishers}
     found: list[Response] = []
     for cause, stimulus in enumerate(stimuli):
@@ -57,6 +71,7 @@ class _Model:
     """The user's function; in all methods, `when` names the message for which the function was called."""
 
     respond: UserFunction
+    names: Sequence[str]
 
     def answer(self, stimulus: Stimulus, when: str) -> list[object]:
         """Return the result of `respond` as a list."""
@@ -66,23 +81,23 @@ class _Model:
             # If `respond` is a generator, the user's code runs only here.
             items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
         if items is None:
-            self.respond.fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", _ANSWER)
+            self.respond.fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", ANSWER)
         return items
 
     def response(self, item: object, cause: int, when: str, known: Mapping[str, Topic]) -> Response:
         """Return an item of the function's result as a response."""
         if not isinstance(item, tuple | list) or len(item) != 2:
-            self.respond.fail(f"for {when}, 'respond' returned a list that contains {item!r}", _ANSWER)
+            self.respond.fail(f"for {when}, 'respond' returned a list that contains {item!r}", ANSWER)
         block, message = item
         if not isinstance(block, str) or block not in known:
             self.respond.fail(
                 f"for {when}, 'respond' returned a message for {block!r}, which is not a publisher",
-                nearest(str(block), known),
+                nearest(str(block), self.names),
                 str(block),
             )
         if not isinstance(message, Mapping):
             self.respond.fail(
-                f"for {when}, 'respond' returned {message!r} for '{block}', which is not a mapping of fields", _ANSWER
+                f"for {when}, 'respond' returned {message!r} for '{block}', which is not a mapping of fields", ANSWER
             )
         publisher = known[block]
         try:

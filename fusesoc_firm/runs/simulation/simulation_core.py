@@ -15,8 +15,16 @@ from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.runs.simulation.environment import environment_files
 from fusesoc_firm.runs.simulation.host_files import expected_text, stimulus_text
 from fusesoc_firm.runs.simulation.kernel_library import kernel_files
-from fusesoc_firm.runs.simulation.reference import Response, responses
-from fusesoc_firm.runs.simulation.software_run import answered, system_stimuli, traffic
+from fusesoc_firm.runs.simulation.model_text import check_model
+from fusesoc_firm.runs.simulation.reference import Response, load_model
+from fusesoc_firm.runs.simulation.software_run import (
+    answered,
+    published,
+    responses_of,
+    system_stimuli,
+    traffic,
+)
+from fusesoc_firm.runs.simulation.stimuli import Stimulus
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.configuration import (
@@ -38,11 +46,13 @@ from fusesoc_firm.system.hardware.verilog_bench import (
 from fusesoc_firm.system.hardware.waits import watched_entity
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import NETWORKS
-from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.reads import Input
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 
+# The number of messages to which the model responds in a check.
+_MOST_CHECKED = 100
 # Synthesis and the translation to Verilog must not use a test bench.
 _BENCH_TAGS = ("simulation",)
 
@@ -59,11 +69,14 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     May raise `InputError`.
     """
     system = loaded.system
-    _check_simulator(system, str(request.parameters["simulator"]), "sim")
-    _refuse_node(loaded)
-    stimuli = system_stimuli(_path(request, "stimuli"), loaded)
-    answers = responses(_path(request, "model"), stimuli, answered(system))
-    found = traffic(system, loaded.folder, stimuli, answers)
+    _check_possible(request, loaded)
+    faults = Diagnostics()
+    with faults.noting(request.place("stimuli")):
+        stimuli = system_stimuli(_path(request, "stimuli"), loaded)
+    with faults.noting(request.place("model")):
+        model = load_model(_path(request, "model"))
+    faults.raise_if_any()
+    found = traffic(system, loaded.folder, stimuli, responses_of(model, stimuli, system))
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
     assert isinstance(seed, int)
     assert isinstance(stall_percent, int)
@@ -80,6 +93,35 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
         "expected.txt": _host_file("expected.txt", expected_text(found.responses, system.publishers, system.id_bytes)),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
+
+
+def check(request: Request, loaded: LoadedSystem, *, may_run: bool) -> None:
+    """Raise `InputError` with the faults of a simulation that are known before anything is compiled.
+
+    The text of the model is checked. If it `may_run`, it responds to the messages or, if there are many, to the first
+    ones.
+    """
+    faults = Diagnostics()
+    stimuli: list[Stimulus] = []
+    with faults.noting():
+        _check_possible(request, loaded)
+        environment_files(_environment(request), loaded.system)
+    with faults.noting(request.place("stimuli")):
+        stimuli = system_stimuli(_path(request, "stimuli"), loaded, _MOST_CHECKED + 1)
+    path = _path(request, "model")
+    with faults.noting(request.place("model")):
+        frames = {topic.block: topic.frame for topic in answered(loaded.system)}
+        check_model(path, frames, published(loaded.system), faults)
+    faults.raise_if_any()
+    if may_run:
+        found = responses_of(load_model(path), stimuli[:_MOST_CHECKED], loaded.system)
+        if len(stimuli) <= _MOST_CHECKED:
+            traffic(loaded.system, loaded.folder, stimuli, found)
+
+
+def _check_possible(request: Request, loaded: LoadedSystem) -> None:
+    _check_simulator(loaded.system, str(request.parameters["simulator"]), "sim")
+    _refuse_node(loaded)
 
 
 def _host_file(name: str, text: str) -> GeneratedFile:

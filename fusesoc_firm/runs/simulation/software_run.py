@@ -16,11 +16,12 @@ from pathlib import Path
 
 from fusesoc_firm.accelerator.functions import Functions, Message, importable_sources
 from fusesoc_firm.accelerator.software import sent_elsewhere, way_to
+from fusesoc_firm.accelerator.user_code import UserFunction
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.values import shown
 from fusesoc_firm.runs.simulation.host_files import differences
-from fusesoc_firm.runs.simulation.reference import Response
+from fusesoc_firm.runs.simulation.reference import Response, answers
 from fusesoc_firm.runs.simulation.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -43,9 +44,9 @@ def stimulated(system: DerivedSystem) -> list[Topic]:
     return [*converters, *topics, *sent_elsewhere(system)]
 
 
-def system_stimuli(path: Path, loaded: LoadedSystem) -> list[Stimulus]:
-    """Return the stimuli of a system in a file or bag. May raise `InputError`."""
-    return read_stimuli(path, stimulated(loaded.system), loaded.system, loaded.libraries)
+def system_stimuli(path: Path, loaded: LoadedSystem, most: int | None = None) -> list[Stimulus]:
+    """Return the stimuli of a system in a file or, `most` at most, in a bag. May raise `InputError`."""
+    return read_stimuli(path, stimulated(loaded.system), loaded.system, loaded.libraries, most)
 
 
 def answered(system: DerivedSystem) -> list[Topic]:
@@ -56,6 +57,16 @@ def answered(system: DerivedSystem) -> list[Topic]:
             name = system.names[End(block.block, side.prefix)]
             found.setdefault(name, Topic(name, side.frame))
     return [*found.values()]
+
+
+def published(system: DerivedSystem) -> list[str]:
+    """Return the names with which a model answers: publishers, and messages from hardware to software."""
+    return [item.block for item in (*system.publishers, *system.software.publishers)]
+
+
+def responses_of(model: UserFunction, stimuli: Sequence[Stimulus], system: DerivedSystem) -> list[Response]:
+    """Return the responses of a system's model to all stimuli. May raise `InputError`."""
+    return answers(model, stimuli, answered(system), published(system))
 
 
 def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> Traffic:

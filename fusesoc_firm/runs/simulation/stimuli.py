@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.runs.simulation.yaml_message import read_message
 from fusesoc_firm.system.derived.model import DerivedSystem, Topic
-from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest, fail, nearest
 from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
@@ -44,18 +45,19 @@ def read_stimuli(
     subscribers: Sequence[Topic],
     system: DerivedSystem | None = None,
     libraries: Mapping[Middleware, MessageLibrary] | None = None,
+    most: int | None = None,
 ) -> list[Stimulus]:
     """Return all messages in a file or bag, in order. May raise `InputError`, also for a file without messages.
 
     In a bag, the calls of services of `system`, and the goals and cancellations of its actions, are messages, too.
+    Of a bag, `most` messages at most are read.
     """
+    fields = "{<field>: <value>, ...}"
+    items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
+    legal = f"a bag, or a YAML file with a list of messages: {items}"
     if not path.exists():
-        fields = "{<field>: <value>, ...}"
-        items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
-        fail(
-            f"the stimuli {path} do not exist",
-            hint=f"legal here: a bag, or a YAML file with a list of messages: {items}",
-        )
+        near = closest(path.name, [item.name for item in path.parent.glob("*")])
+        fail(f"the stimuli {path} do not exist", hint=f"did you mean '{near}'?" if near else f"legal here: {legal}")
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
     else:
@@ -65,10 +67,11 @@ def read_stimuli(
 
         hint = f"stimuli are a YAML file (.yaml, .yml) or a bag; {BAGS}"
         found = read_bag(path, subscribers, hint, system, libraries)
-        stimuli = [_recorded(path, *message) for message in found]
+        stimuli = [_recorded(path, *message) for message in islice(found, most)]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
-        fail(f"{path} contains no message for {names}")
+        place = SourceRef(str(path), 1, 1) if path.suffix in _YAML_SUFFIXES else None
+        fail(f"{path} contains no message for {names}", place, f"legal here: {legal}")
     return stimuli
 
 

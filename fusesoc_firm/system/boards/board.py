@@ -115,6 +115,7 @@ class Board(Section):
     )
     synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
     nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
+    loader: Text | None = key("the board's name in openFPGALoader, for firm load", rule=word_fault)
     pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin)
     name: str = ""
 

@@ -54,7 +54,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))
     hint = f"expected: {prototype(type_)}"
     try:
-        found = _definition(ast.parse(file.text), function_name(type_))
+        found = definition(ast.parse(file.text), function_name(type_))
     except (SyntaxError, ValueError) as error:
         line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
         faults.error(
@@ -63,7 +63,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         return
     if found is None:
         faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)
-    elif isinstance(found, ast.FunctionDef) and not _takes(found.args, len(type_.inputs)):
+    elif isinstance(found, ast.FunctionDef) and not takes(found.args, len(type_.inputs)):
         count = len(type_.inputs)
         message = f"'{found.name}' cannot be called with {count} message{'' if count == 1 else 's'}"
         faults.error(message, file.place(found.lineno, found.col_offset + 1), hint)
@@ -87,7 +87,7 @@ class _File:
         return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
 
 
-def _definition(module: ast.Module, name: str) -> ast.stmt | None:
+def definition(module: ast.Module, name: str) -> ast.stmt | None:
     """Return the last statement of a module that binds a name, since this statement determines the name's value."""
     return next((found for found in reversed([*_statements(module.body)]) if name in _bound(found)), None)
 
@@ -115,7 +115,7 @@ def _bound(statement: ast.stmt) -> set[str]:
     return set()
 
 
-def _takes(arguments: ast.arguments, count: int) -> bool:
+def takes(arguments: ast.arguments, count: int) -> bool:
     """Return whether a function can be called with this number of positional arguments."""
     positional = len(arguments.posonlyargs) + len(arguments.args)
     fewest = positional - len(arguments.defaults)

