@@ -114,6 +114,9 @@ def _open(arguments: argparse.Namespace) -> None:
 
     if not arguments.place.exists():
         fail(f"there is no file or folder {arguments.place}")
+    from fusesoc_firm.studio.page_files import build_page
+
+    build_page(lambda text: print(text, file=sys.stderr, flush=True))
     studio = _studio(arguments, arguments.place)
 
     async def serve() -> None:
@@ -139,6 +142,9 @@ def _require_aiohttp() -> None:
 
 def _show(studio: Studio, arguments: argparse.Namespace, to: TextIO) -> None:
     """Print the page's address, and open it."""
+    from fusesoc_firm.studio.page_files import say_if_missing
+
+    say_if_missing(lambda text: print(text, file=sys.stderr, flush=True))
     print(f"{studio.address}\nfor Foxglove: {studio.foxglove}\nCtrl-C ends it", file=to, flush=True)
     if not arguments.no_browser:
         webbrowser.open(studio.address)

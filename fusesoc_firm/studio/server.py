@@ -17,6 +17,7 @@ from fusesoc_firm.studio.editing import Editing
 from fusesoc_firm.studio.evaluation import Evaluation
 from fusesoc_firm.studio.foxglove import FOXGLOVE
 from fusesoc_firm.studio.live import Live
+from fusesoc_firm.studio.page_files import PAGE
 from fusesoc_firm.studio.requests import Handler, in_json
 from fusesoc_firm.studio.views import Views
 from fusesoc_firm.studio.workspace import Tools, Workspace
@@ -25,7 +26,6 @@ from fusesoc_firm.text.yaml_edit import EditError
 from fusesoc_firm.text.yaml_text import SMALL
 
 HOST = "127.0.0.1"
-_PAGE = Path(__file__).parent / "static"
 # Everything comes from this server; nothing that a file contains can run.
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self';"
@@ -59,8 +59,8 @@ class Studio:
         for words, handler in (item for part in self._parts for item in part.requests().items()):
             method, name = words.split()
             app.router.add_route(method, f"{under}/api/{name}", handler)
-        if (_PAGE / "assets").is_dir():
-            app.router.add_static(f"{under}/assets", _PAGE / "assets")
+        if (PAGE / "assets").is_dir():
+            app.router.add_static(f"{under}/assets", PAGE / "assets")
         app.cleanup_ctx.append(self._editing.following)
         app.on_shutdown.extend([lambda _: self.live.close(), lambda _: self._evaluation.close()])
         runner = web.AppRunner(app, access_log=None)
@@ -98,7 +98,7 @@ class Studio:
 
     async def _page(self, _: web.Request) -> web.Response:
         try:
-            text = (_PAGE / "index.html").read_text(encoding="utf-8")
+            text = (PAGE / "index.html").read_text(encoding="utf-8")
         except OSError:
             text = "The page is not built; 'make studio' builds it.\n"
         # The browser requests the first picture's data at once, before the page's program starts.
