@@ -22,6 +22,7 @@ from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, number
 from fusesoc_firm.studio.page_run import Run, SimulatedRun, Wishes
 from fusesoc_firm.studio.reports import Reports, row
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
+from fusesoc_firm.studio.units import unit_of
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
 from fusesoc_firm.text.json_text import json_text
@@ -138,8 +139,9 @@ class Live:
 
     async def _record(self, request: web.Request) -> web.Response:
         """Return the rows of the record before a message."""
-        rows = self._current().watch.before(number_of(request, "before"), _MOST_ROWS)
-        return in_json({"messages": [*map(row, rows)]})
+        run = self._current()
+        rows, topics = run.watch.before(number_of(request, "before"), _MOST_ROWS), run.topics
+        return in_json({"messages": await asyncio.to_thread(lambda: [row(seen, topics) for seen in rows])})
 
     async def _message(self, request: web.Request) -> web.Response:
         """Return the fields of a message, and the waits while the hardware worked on it."""
@@ -148,7 +150,8 @@ class Live:
         found = await asyncio.to_thread(fields_of, frame, seen.payload)
         kinds = {"hasPicture": has_picture(frame), "hasPose": has_pose(frame)}
         waits = run.watch.waits_during(seen, _MOST_WAITS)
-        return in_json({"row": row(seen), "type": str(frame.message), **kinds, **found, "waits": waits and vars(waits)})
+        found |= {"row": row(seen, run.topics), "type": str(frame.message), "waits": waits and vars(waits)}
+        return in_json(kinds | found)
 
     async def _picture(self, request: web.Request) -> web.Response:
         """Return the picture in a message."""
@@ -250,12 +253,14 @@ def wave(system: DerivedSystem, topic: Topic, seen: Seen) -> dict[str, Any]:
 
 
 def series(frame: Frame, messages: Sequence[Seen], field: str) -> dict[str, Any]:
-    """Return the value of a field in messages: points of seconds and value, and the names of all available fields.
+    """Return the value of a field in messages: points of seconds and value, its unit, and the names of all fields.
 
     The value is None if the message lacks this number.
     """
     fields = [LATENCY, BYTES, *(numbers_of(frame, messages[-1].payload) if messages else ())]
-    return {"fields": fields, "points": [(seen.time_ns / 1e9, _value(frame, seen, field)) for seen in messages]}
+    unit = "bytes" if field == BYTES else unit_of(str(frame.message), field)
+    points = [(seen.time_ns / 1e9, _value(frame, seen, field)) for seen in messages]
+    return {"fields": fields, "unit": unit, "points": points}
 
 
 def _value(frame: Frame, seen: Seen, field: str) -> float | None:

@@ -5,18 +5,24 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from itertools import islice
 from math import hypot, isfinite
 from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.runs.simulation.host_files import is_zero, leaves, value_text
+from fusesoc_firm.studio.units import unit_of
 
 # The largest parts of a message that are sent to the page.
 _MOST_FIELDS, _MOST_ITEMS, _MOST_CHARACTERS, _MOST_BYTES = 500, 16, 500, 32
 _MOST_PIXELS = 2**24
-# The longest payload in bytes whose numbers can be plotted.
-_MOST_PLOTTED = 2**16
+# The longest payload in bytes whose numbers can be plotted, and the longest one whose fields are listed, since lists
+# show many messages a second.
+_MOST_PLOTTED, _MOST_LISTED = 2**16, 2**12
+# The number of characters of a message in a list.
+_MOST_LISTED_CHARACTERS = 160
 # The place of a message's pose: its field, and the names of its position and rotation.
 _POSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "geometry_msgs/Pose": ((), "position", "orientation"),
@@ -27,6 +33,9 @@ _POSES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "geometry_msgs/TransformStamped": (("transform",), "translation", "rotation"),
     "nav_msgs/Odometry": (("pose", "pose"), "position", "orientation"),
 }
+# The fields of a time in ROS 2 and in ROS 1; the seconds of the years 2000 and 2100, between which it is a date.
+_STAMPS = {("sec", "nanosec"), ("secs", "nsecs")}
+_FIRST_DATE, _LAST_DATE = 946_684_800, 4_102_444_800
 _IMAGE, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 # For each encoding of sensor_msgs/Image: bits of a value, and the places of red, green and blue or of gray in a pixel.
 _ENCODINGS: dict[str, tuple[int, tuple[int, ...], int]] = {
@@ -46,7 +55,7 @@ _SAFE = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
 def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
-    """Return the fields of a message: rows of a dotted name and a shortened text, and the number of omitted rows.
+    """Return the fields of a message: rows of a dotted name, a shortened text and a unit, and whether rows are omitted.
 
     For an invalid payload, the result has a `fault`.
     """
@@ -54,7 +63,33 @@ def fields_of(frame: Frame, payload: bytes) -> dict[str, Any]:
         rows = [*islice(_rows("", decode(frame, payload)), _MOST_FIELDS + 1)]
     except CodecError as error:
         return {"fields": [], "isShortened": False, "fault": str(error)}
-    return {"fields": rows[:_MOST_FIELDS], "isShortened": len(rows) > _MOST_FIELDS, "fault": ""}
+    fields = [(name, text, unit_of(str(frame.message), name)) for name, text in rows[:_MOST_FIELDS]]
+    return {"fields": fields, "isShortened": len(rows) > _MOST_FIELDS, "fault": ""}
+
+
+def words_of(frame: Frame, payload: bytes) -> list[str]:
+    """Return the fields of a message as `firm sim` prints them, such as `point.x=1.5`, up to the length of a line.
+
+    The fields of a header come last. If the line is too long, zero and empty fields are omitted. An invalid or long
+    payload has no words.
+    """
+    if len(payload) > _MOST_LISTED:
+        return []
+    try:
+        fields = sorted(leaves(decode(frame, payload)), key=lambda field: field[0].startswith("header."))
+    except CodecError:
+        return []
+    words = [f"{name}={value_text(value)}" for name, value in fields]
+    if len(" ".join(words)) > _MOST_LISTED_CHARACTERS:
+        words = [word for word, (_, value) in zip(words, fields, strict=True) if not is_zero(value)]
+    found: list[str] = []
+    room = _MOST_LISTED_CHARACTERS
+    for word in words:
+        if len(word) > room:
+            return [*found, f"{word[:room]}..."]
+        found.append(word)
+        room -= len(word) + 1
+    return found
 
 
 def numbers_of(frame: Frame, payload: bytes) -> dict[str, float | None]:
@@ -119,7 +154,9 @@ def picture_of(frame: Frame, payload: bytes) -> tuple[bytes, str] | None:
 
 
 def _rows(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and tuple(value) in _STAMPS:
+        yield name, _stamp_text(*value.values())
+    elif isinstance(value, Mapping):
         for key, item in value.items():
             yield from _rows(f"{name}.{key}" if name else str(key), item)
     elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
@@ -138,6 +175,16 @@ def _numbers(name: str, value: Any) -> Iterator[tuple[str, float | None]]:
             yield from _numbers(f"{name}[{number}]", item)
     elif isinstance(value, int | float):
         yield name, float(value) if isfinite(value) else None
+
+
+def _stamp_text(seconds: int, nanoseconds: int) -> str:
+    """Return a time: as a date if its seconds are since 1970, and otherwise in seconds."""
+    if seconds < 0 or nanoseconds >= 10**9:
+        return f"{seconds} s + {nanoseconds} ns"
+    text = f"{seconds}.{nanoseconds:09d} s"
+    if not _FIRST_DATE <= seconds <= _LAST_DATE:
+        return text
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S}.{nanoseconds:09d} UTC ({text})"
 
 
 def _text(value: Any) -> str:

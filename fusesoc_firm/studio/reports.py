@@ -12,7 +12,9 @@ from math import inf
 from typing import Any
 
 from fusesoc_firm.node.engine.watch import Count, Seen
+from fusesoc_firm.studio.message import words_of
 from fusesoc_firm.studio.page_run import RUNNING, Run
+from fusesoc_firm.system.derived.model import Topic
 
 # The number of messages in a report.
 _MOST_NEW = 20
@@ -53,7 +55,8 @@ class Reports:
         news = run.watch.since(self._last, _MOST_NEW)
         if news.last != self._last:
             report |= {"first": run.watch.first, "last": news.last, "skipped": news.skipped}
-            report["messages"] = [*map(row, news.messages)]
+            topics = run.topics
+            report["messages"] = [row(seen, topics) for seen in news.messages]
             self._last, self._is_stale = news.last, True
 
     def _add_figures(self, run: Run, report: dict[str, Any]) -> None:
@@ -98,8 +101,8 @@ def figures(run: Run) -> dict[str, Any]:
     }
 
 
-def row(seen: Seen) -> tuple[object, ...]:
-    """Return a message without its content: number, block, time, bytes, cause, cycles, and ns of the wall clock."""
+def row(seen: Seen, topics: Mapping[str, Topic]) -> tuple[object, ...]:
+    """Return a message: number, block, time, bytes, cause, cycles, ns of the wall clock, and its fields as words."""
     latency = seen.latency
     return (
         seen.number,
@@ -109,6 +112,7 @@ def row(seen: Seen) -> tuple[object, ...]:
         latency.cause,
         latency.cycles,
         latency.wall_ns,
+        words_of(topics[seen.block].frame, seen.payload),
     )
 
 

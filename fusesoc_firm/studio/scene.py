@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import fields
+from itertools import pairwise
 from typing import Any
 
 import yaml
@@ -27,8 +28,9 @@ Load = Callable[[str], LoadedSystem]
 def scene(text: str, file: str, load: Load) -> dict[str, Any]:
     """Return a specification as plain data; diagnostics call it `file`.
 
-    `specification` is the file's content (None if it is not a mapping in YAML), `faults` are its faults and warnings,
-    each with the `path` of its item, and `derived` is what `firm system show` prints (None if there are faults).
+    `specification` is the file's content (None if it is not a mapping in YAML), `lines` are the first and the last line
+    of each block, `faults` are its faults and warnings, each with the `path` of its item, and `derived` is what
+    `firm system show` prints (None if there are faults).
     """
     derived = None
     diagnostics: Iterable[Diagnostic]
@@ -41,12 +43,12 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
     read = _read(text)
     root = read.root if read else None
     faults = [_fault(root, file, item) for item in diagnostics]
-    return {"specification": _content(read), "faults": faults, "derived": derived}
+    return _written(read) | {"faults": faults, "derived": derived}
 
 
 def outline(text: str) -> dict[str, Any]:
     """Return the part of a scene that needs no derivation."""
-    return {"specification": content_of(text), "faults": [], "derived": None}
+    return _written(_read(text)) | {"faults": [], "derived": None}
 
 
 def grammar() -> dict[str, Any]:
@@ -59,6 +61,21 @@ def grammar() -> dict[str, Any]:
 def content_of(text: str) -> dict[str, Any] | None:
     """Return the mapping in a text, or None if the text is anything else."""
     return _content(_read(text))
+
+
+def _written(read: YamlText | None) -> dict[str, Any]:
+    return {"specification": _content(read), "lines": _lines(read.root if read else None)}
+
+
+def _lines(root: yaml.Node | None) -> list[tuple[int, int]]:
+    """Return the first and the last line of each block, counted from 1; a block ends where the next one begins."""
+    sections = root.value if isinstance(root, yaml.MappingNode) else ()
+    blocks = next((value for key, value in sections if key.value == "blocks"), None)
+    if not isinstance(blocks, yaml.SequenceNode):
+        return []
+    end = blocks.end_mark.line + (blocks.end_mark.column > 0)
+    starts = [item.start_mark.line + 1 for item in blocks.value]
+    return [(first, max(first, after - 1)) for first, after in pairwise([*starts, end + 1])]
 
 
 def _content(read: YamlText | None) -> dict[str, Any] | None:

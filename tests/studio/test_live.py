@@ -23,7 +23,7 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.node.engine.watch import Control, Latency, Load, Seen, Waits, Watch
 from fusesoc_firm.studio import page_run
 from fusesoc_firm.studio.live import Live
-from fusesoc_firm.studio.message import fields_of, picture_of, pose_of
+from fusesoc_firm.studio.message import fields_of, picture_of, pose_of, words_of
 from fusesoc_firm.studio.page_run import Run
 from fusesoc_firm.studio.reports import Reports
 from fusesoc_firm.studio.server import Studio
@@ -94,13 +94,17 @@ def test_a_run_is_told_to_its_end(studio: Studio) -> None:
     assert len(rows) == 6
     for name in "point", "text", "image":
         number, _, seconds, size, *others = rows[name]
-        assert others == [None, None, None]
+        assert others[:3] == [None, None, None]
         answer = rows[f"{name}_out"]
         beats = -(-(size + 5) // 8)
         # The model of the hardware takes this long.
         assert answer[3:6] == [size, number, 2 * beats - 1 + 10]
         assert answer[2] >= seconds
         assert answer[6] > 0
+    # The fields of the messages, as `firm sim` prints them.
+    assert rows["point_out"][7] == ["x=1.5", "y=-2.0", "z=1e+300"]
+    assert rows["text"][7] == [f"data={json.dumps(HOSTILE)}"]
+    assert rows["image"][7][:2] == ["height=2", "width=3"] and rows["image"][7][-1].endswith("...")
     assert "sent" in run["text"]
 
 
@@ -136,7 +140,7 @@ def test_messages_of_services_and_actions_are_played(tmp_path: Path) -> None:
         counts = {name: count["messages"] for name, count in news["counts"].items()}
         assert counts == {"enable_request": 3, "enable_response": 3}
         found = ask(studio, "GET", f"api/message?number={news['last']}")[2]
-        assert (found["type"], found["fields"]) == ("demo_msgs/Enable_Response", [["success", "True"]])
+        assert (found["type"], found["fields"]) == ("demo_msgs/Enable_Response", [["success", "True", ""]])
 
 
 def test_a_page_that_confirms_nothing_holds_nothing_up(studio: Studio) -> None:
@@ -295,12 +299,12 @@ def test_messages_are_opened(studio: Studio) -> None:
     for name in "point", "point_out":
         found = ask(studio, "GET", f"api/message?number={numbers[name]}")[2]
         assert (found["type"], found["hasPicture"]) == ("geometry_msgs/Point", False)
-        assert found["fields"] == [["x", "1.5"], ["y", "-2.0"], ["z", "1e+300"]]
+        assert found["fields"] == [["x", "1.5", "m"], ["y", "-2.0", "m"], ["z", "1e+300", "m"]]
     found = ask(studio, "GET", f"api/message?number={numbers['text_out']}")[2]
-    assert found["fields"] == [["data", HOSTILE]]
+    assert found["fields"] == [["data", HOSTILE, ""]]
     found = ask(studio, "GET", f"api/message?number={numbers['image_out']}")[2]
     assert found["hasPicture"]
-    assert ["header.frame_id", HOSTILE] in found["fields"]
+    assert ["header.frame_id", HOSTILE, ""] in found["fields"]
     status, answer, _ = ask(studio, "GET", f"api/picture?number={numbers['text_out']}")
     assert status == 404
     status, answer, _ = ask(studio, "GET", f"api/picture?number={numbers['image_out']}")
@@ -513,10 +517,43 @@ def test_only_pictures_without_scripts_are_shown(tmp_path: Path) -> None:
         assert picture_of(layout, payload) == expected
 
 
+def test_fields_have_units_and_times_in_words(tmp_path: Path) -> None:
+    spec = write_system(tmp_path, (), {"imu": "sensor_msgs/Imu"})
+    layout = frame(spec, "imu")
+
+    still = {"x": 0.0, "y": 0.0, "z": 0.0}
+    imu = {"orientation": still | {"w": 1.0}, "angular_velocity": still, "linear_acceleration": still | {"z": 9.5}}
+    unknown = {f"{name}_covariance": [0.0] * 9 for name in imu}
+
+    def shown(seconds: int) -> dict[str, str]:
+        header = {"stamp": {"sec": seconds, "nanosec": 5}, "frame_id": ""}
+        found = fields_of(layout, encode(layout, {"header": header, **imu, **unknown}))
+        return {name: f"{text} {unit}".rstrip() for name, text, unit in found["fields"]}
+
+    assert shown(12)["header.stamp"] == "12.000000005 s"
+    assert shown(1_700_000_000)["header.stamp"] == "2023-11-14 22:13:20.000000005 UTC (1700000000.000000005 s)"
+    assert shown(-1)["header.stamp"] == "-1 s + 5 ns"
+    assert shown(0)["linear_acceleration.z"] == "9.5 m/s²"
+    assert shown(0)["angular_velocity.x"] == "0.0 rad/s"
+    assert shown(0)["linear_acceleration_covariance"] == "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0"
+
+
+def test_a_list_shows_the_fields_that_are_not_zero(spec: Path) -> None:
+    layout = frame(spec, "image")
+    payload = encode(
+        layout, image("mono8", [5] * 100) | {"header": {"stamp": {"sec": 3, "nanosec": 0}, "frame_id": "c"}}
+    )
+    words = words_of(layout, payload)
+    assert words[-1].endswith("...") and "is_bigendian=0" not in words
+    assert len(" ".join(words)) <= 170
+    assert words_of(layout, encode(layout, image("mono8", [5] * 5000))) == []
+    assert words_of(layout, b"\0") == []
+
+
 def test_large_messages_are_shortened(spec: Path) -> None:
     layout = frame(spec, "image")
     payload = encode(layout, image("mono8", [5] * 100_000))
-    shown = dict(fields_of(layout, payload)["fields"])
+    shown = {name: text for name, text, _ in fields_of(layout, payload)["fields"]}
     assert shown["data"].startswith("05 05")
     assert shown["data"].endswith("(100000 bytes)")
     assert len(json.dumps(shown)) < 1000

@@ -12,7 +12,7 @@ from ruamel.yaml.error import YAMLError
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.studio.scene import scene
+from fusesoc_firm.studio.scene import outline, scene
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.system.written.specification import Draft
 
@@ -60,3 +60,20 @@ def test_faults_lead_to_their_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
                 assert fault["path"][:2] == ["blocks", block], (path, fault)
                 seen += 1
     assert seen > 100
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("project: {name: a}\n", []),
+        ("blocks: []\n", []),
+        ("blocks: 5\n", []),
+        ("- blocks\n", []),
+        ("blocks:\n  - name: a\n    mode: b\n  - {name: c}\n\npaths: [x]\n", [(2, 3), (4, 5)]),
+        ("blocks: [{name: a}, {name: b}]\n", [(1, 1), (1, 1)]),
+        ("paths: [x]\nblocks:\n  # First.\n  - name: a\n    type: b", [(4, 5)]),
+        ("blocks:\n  - &a {name: a}\n  - *a\n", [(2, 2), (2, 3)]),
+    ],
+)
+def test_the_lines_of_blocks(text: str, lines: list[tuple[int, int]]) -> None:
+    assert outline(text)["lines"] == lines

@@ -90,6 +90,7 @@ async def violations(page: Page) -> list[object]:
 
 def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
     async def steps(page: Page) -> None:
+        await page.evaluate("document.querySelector('.run details').open = true")
         await page.evaluate("[...document.querySelectorAll('.run [type=checkbox]')].at(-1).focus()")
         await page.press(" ")
         await press(page, "run")
@@ -119,7 +120,8 @@ def test_a_run_is_watched_paused_and_read_backwards(tmp_path: Path) -> None:
         await page.until(f"{title}.startsWith('{last - 1}:')")
         await press(page, "next", ".message")
         await page.until(f"{title}.startsWith('{last}:')")
-        await page.evaluate("[...document.querySelectorAll('.message p button')].at(-1).focus()")
+        cause = "[...document.querySelectorAll('.message p button')].find(item => item.textContent.includes('cause'))"
+        await page.evaluate(f"{cause}.focus()")
         await page.press("Enter")
         await page.until(f"{title}.endsWith(': point, geometry_msgs/Point')")
         await press(page, "continue")
@@ -235,6 +237,7 @@ def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:
     """The model takes no frame after 20, so messages wait and are dropped."""
 
     async def steps(page: Page) -> None:
+        await page.evaluate("document.querySelector('.run details').open = true")
         await page.evaluate("document.querySelector('.run input[type=number]').focus()")
         await page.evaluate("document.activeElement.select()")
         await page.write("5000")

@@ -25,6 +25,8 @@ export interface Scene {
   canUndo: boolean;
   canRedo: boolean;
   specification: Section | null;
+  /** The first and the last line of each block. */
+  lines: [number, number][];
   faults: Fault[];
   derived: Section | null;
 }
@@ -77,13 +79,16 @@ export const write = (file: string, version: string, text: string) => post<Scene
 export const step = (what: "undo" | "redo", file: string, version: string) => post<Scene>(what, { file, version });
 export const check = (file: string, text: string) => post<Scene>("check", { file, text });
 
+/** The dotted name of a field, its text and its unit. */
+export type FieldText = [string, string, string];
+
 /** A message with its fields as texts. */
 export interface Message {
   row: Row;
   type: string;
   hasPicture: boolean;
   hasPose: boolean;
-  fields: [string, string][];
+  fields: FieldText[];
   isShortened: boolean;
   fault: string;
   waits: Waits | null;

@@ -9,8 +9,8 @@ const OPTIONS = {
   "elk.direction": "RIGHT",
   "elk.edgeRouting": "POLYLINE",
   "elk.separateConnectedComponents": "false",
-  "elk.spacing.nodeNode": "24",
-  "elk.layered.spacing.nodeNodeBetweenLayers": "110",
+  "elk.spacing.nodeNode": "40",
+  "elk.layered.spacing.nodeNodeBetweenLayers": "100",
   "elk.layered.thoroughness": "1",
   "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
 };

@@ -1,13 +1,11 @@
 // The picture as a file: SVG, drawn from the blocks and wires themselves, or PNG.
 
 import type { Edge } from "@xyflow/svelte";
-import { wayOf, type BlockNode, type WireData } from "./graph";
+import { HEAD, LINE, PAD, shortened, SIDES, TEXT, TITLE, wayOf, type BlockNode, type WireData } from "./graph";
 import type { Live } from "./live.svelte";
 
-// With room for a wire below the lowest block.
 const MARGIN = 40;
-const LINE = 17;
-const SMALL_LINE = 14;
+const SMALL_LINE = 16;
 // Pixels of PNG for each unit of the picture.
 const SCALE = 2;
 
@@ -35,7 +33,8 @@ export function svgOf(nodes: BlockNode[], edges: Edge[], live: Live): string {
   const bottom = Math.max(...nodes.map((node) => node.position.y + node.height!));
   const left = Math.min(...nodes.map((node) => node.position.x));
   const top = Math.min(...nodes.map((node) => node.position.y));
-  const box = [left - MARGIN, top - MARGIN, right - left + 2 * MARGIN, bottom - top + 2 * MARGIN];
+  // A PNG has whole pixels.
+  const box = [left - MARGIN, top - MARGIN, Math.ceil(right - left) + 2 * MARGIN, Math.ceil(bottom - top) + 2 * MARGIN];
   const places = new Map(nodes.map((node) => [node.id, node]));
   const wires = edges.flatMap((edge) => {
     const [source, target] = [places.get(edge.source), places.get(edge.target)];
@@ -43,7 +42,7 @@ export function svgOf(nodes: BlockNode[], edges: Edge[], live: Live): string {
   });
   const blocks = nodes.map((node) => block(node, colour, live));
   const size = `width="${box[2]}" height="${box[3]}"`;
-  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="${box.join(" ")}" ${size} font-family="sans-serif" font-size="12">
+  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="${box.join(" ")}" ${size} font-family="sans-serif" font-size="${TEXT}">
 <rect x="${box[0]}" y="${box[1]}" ${size} fill="${colour("paper")}"/>
 ${[...wires, ...blocks].join("\n")}
 </svg>
@@ -53,9 +52,10 @@ ${[...wires, ...blocks].join("\n")}
 function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: Colour, live: Live): string {
   const from: [number, number] = [source.position.x + source.width!, source.position.y + source.height! / 2];
   const to: [number, number] = [target.position.x, target.position.y + target.height! / 2];
-  const [path, x, y] = wayOf(edge.id, from, to);
-  const { words, waiting } = live.shown(edge.data as WireData);
-  const stroke = colour(waiting ? (waiting === "waits" ? "warn" : "bad") : "faint");
+  const data = edge.data as WireData;
+  const [path, x, y] = wayOf(edge.id, from, to, data.way!);
+  const { words, waiting } = live.shown(data);
+  const stroke = colour(waiting ? "warn" : "faint");
   const line = `<path d="${path}" fill="none" stroke="${stroke}" stroke-width="${edge.class === "stream" ? 3 : 1}"/>`;
   return line + linesAt([edge.label, words].filter(Boolean).join("\n"), x, y, colour);
 }
@@ -64,21 +64,36 @@ function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: Colour, 
 function linesAt(words: string, x: number, y: number, colour: Colour): string {
   const lines = words ? words.split("\n") : [];
   return lines
-    .map((line, index) => `<text x="${x}" y="${y + SMALL_LINE * (index - (lines.length - 1) / 2) + 4}" text-anchor="middle" font-size="11" fill="${colour("ink")}">${escaped(line)}</text>`)
+    .map((line, index) => `<text x="${x}" y="${y + SMALL_LINE * (index - (lines.length - 1) / 2) + 4}" text-anchor="middle" fill="${colour("ink")}">${escaped(line)}</text>`)
     .join("");
 }
 
 const fills: Record<string, string> = { subscriber: "converter", publisher: "converter" };
 
-function block({ position: { x, y }, width, height, data }: BlockNode, colour: Colour, live: Live): string {
+function block(node: BlockNode, colour: Colour, live: Live): string {
+  const { position, width, height, data } = node;
+  const { x, y } = position;
   const rim = colour(data.errors ? "bad" : "faint");
-  const round = ["accelerator", "software", "service"].includes(data.kind) ? 10 : 3;
-  const lines = [data.name, ...data.lines].map(
-    (line, index) => `<text x="${x + 10}" y="${y + 17 + LINE * index}"${index ? "" : ' font-weight="bold"'} fill="${colour("ink")}">${escaped(line)}</text>`,
-  );
-  const waits = data.wire ? live.shown(data.wire).words : "";
-  const below = linesAt(waits.replace("\n", ", "), x + width! / 2, y + height! + SMALL_LINE / 2, colour);
-  return `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="${round}" fill="${colour(fills[data.kind] ?? data.kind)}" stroke="${rim}"/>${lines.join("")}${below}`;
+  const box = `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="8" fill="${colour(fills[data.kind] ?? data.kind)}" stroke="${rim}"/>`;
+  if (data.wire) return box + side(node, live.shown(data.wire).words, colour);
+  const value = data.topics ? (live.latestOf(data.file, data.topics)?.[7] ?? []).join(" ") : "";
+  const lines = [data.name, ...data.lines, ...(value ? [value] : [])].map((line, index) => {
+    const place = `x="${x + PAD}" y="${y + (index ? HEAD + LINE * index - 4 : 22)}"`;
+    return `<text ${place}${index ? "" : ` font-size="${TITLE}" font-weight="bold"`} fill="${colour("ink")}">${escaped(shortened(line, width! - SIDES))}</text>`;
+  });
+  return box + lines.join("");
+}
+
+/** The words of a side of the Manager, from above to below. */
+function side({ position: { x, y }, width, height, data }: BlockNode, waits: string, colour: Colour): string {
+  const lines = [data.name, ...data.lines, ...(waits ? [waits.replace("\n", ", ")] : [])];
+  const middle = y + height! / 2;
+  return lines
+    .map((line, index) => {
+      const place = x + width! / 2 + LINE * ((lines.length - 1) / 2 - index) - 4;
+      return `<text transform="translate(${place} ${middle}) rotate(90)" text-anchor="middle"${index ? "" : ' font-weight="bold"'} fill="${colour("ink")}">${escaped(line)}</text>`;
+    })
+    .join("");
 }
 
 /** Return an SVG as PNG. */

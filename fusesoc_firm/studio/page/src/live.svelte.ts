@@ -4,8 +4,11 @@ import { address } from "./api";
 import type { WireData } from "./graph";
 import { since, waitsOf, waitWords, type Wait, type Waits, type Way } from "./waits";
 
-/** A message without its content: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock. */
-export type Row = [number, string, number, number, number | null, number | null, number | null];
+/**
+ * A message: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock; then its fields as
+ * words, such as `x=1.5`.
+ */
+export type Row = [number, string, number, number, number | null, number | null, number | null, string[]];
 
 export interface Run {
   number: number;
@@ -62,9 +65,10 @@ export interface Shown {
   words: string;
   waiting: "" | "waits" | "waits first";
   isCrowded: boolean;
+  isFlowing: boolean;
 }
 
-const NOTHING: Shown = { words: "", waiting: "", isCrowded: false };
+const NOTHING: Shown = { words: "", waiting: "", isCrowded: false, isFlowing: false };
 
 // Each further row costs time in each picture; older ones are in the record.
 const MOST_ROWS = 100;
@@ -96,6 +100,10 @@ export class Live {
   skipped = $state(0);
   /** The words at the wire of each block. */
   words = $state.raw<Record<string, string>>({});
+  /** The latest message of each block. */
+  latest = $state.raw<Record<string, Row>>({});
+  /** The blocks that messages have passed in the last second. */
+  flowing = $state.raw<Set<string>>(new Set());
   /** The names of inputs whose queues are full. */
   crowded = $state.raw<Set<string>>(new Set());
   /** The longest of the latest latencies of each block, in cycles. */
@@ -126,7 +134,22 @@ export class Live {
       words: [...words, waiting].filter(Boolean).join("\n"),
       waiting: waiting && (isFirst ? "waits first" : "waits"),
       isCrowded: ends.some(({ block }) => this.crowded.has(block ?? "")),
+      isFlowing: ends.some(({ block, wire }) => [block ?? "", ...wire.split(">")].some((name) => this.flowing.has(name))),
     };
+  }
+
+  /** What a block of a file does: whether messages pass it, or wait because its queue is full. */
+  stateOf(file: string, topics: string[]): "" | "flowing" | "crowded" {
+    if (this.run?.file !== file) return "";
+    if (topics.some((topic) => this.crowded.has(topic))) return "crowded";
+    return topics.some((topic) => this.flowing.has(topic)) ? "flowing" : "";
+  }
+
+  /** The latest message of a block of a file. */
+  latestOf(file: string, topics: string[]): Row | undefined {
+    if (this.run?.file !== file) return undefined;
+    const found = topics.flatMap((topic) => (this.latest[topic] ? [this.latest[topic]] : []));
+    return found.sort(([one], [other]) => one - other).at(-1);
   }
 
   /** Follow the run until the returned function is called; connects again if the server was restarted. */
@@ -169,12 +192,14 @@ export class Live {
       this.#history = [];
       [this.rows, this.skipped, this.isFollowing, this.first, this.last] = [[], 0, true, 0, -1];
       [this.past, this.#present] = [null, null];
+      [this.latest, this.words, this.flowing, this.crowded] = [{}, {}, new Set(), new Set()];
     }
     if (run !== undefined) this.run = run;
     if (messages) {
       // What had passed before the page looked is not missing in the list.
       this.skipped += this.last < 0 ? 0 : skipped!;
       [this.first, this.last] = [first!, last!];
+      this.latest = { ...this.latest, ...Object.fromEntries(messages.map((row) => [row[1], row])) };
       if (this.isFollowing) this.rows = [...this.rows, ...messages].slice(-MOST_ROWS);
     }
     if (figures && this.run) this.#show(figures, this.run);
@@ -195,9 +220,12 @@ export class Live {
     const oldest = this.#history[0];
     const seconds = now - oldest.seconds;
     const found: Record<string, string> = {};
+    const isRunning = run.state === "running" && !run.isPaused;
+    const flowing = new Set<string>();
     for (const [name, count] of Object.entries(counts)) {
       const rate = seconds > 0 ? (count.messages - (oldest.counts[name]?.messages ?? 0)) / seconds : 0;
-      const words = [run.state === "running" && !run.isPaused ? `${quantity(rate)}/s` : `${count.messages} messages`];
+      if (isRunning && rate > 0) flowing.add(name);
+      const words = [isRunning ? `${quantity(rate)}/s` : `${count.messages} messages`];
       const load = loads[name];
       if (load?.waiting) words.push(`${load.waiting} of ${load.capacity} wait`);
       for (const kind of ["dropped", "refused", "lost"] as const) if (load?.[kind]) words.push(`${load[kind]} ${kind}`);
@@ -211,6 +239,7 @@ export class Live {
       }
       found[name] = words.join("\n");
     }
+    this.flowing = flowing;
     return found;
   }
 }

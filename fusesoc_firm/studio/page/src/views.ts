@@ -60,6 +60,7 @@ export interface Wave {
 
 export interface Series {
   fields: string[];
+  unit: string;
   points: [number, number | null][];
 }
 
