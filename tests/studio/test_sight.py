@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm.studio.page_run import Run
+from fusesoc_firm.studio.server import Studio
 from tests.studio.browser import PROGRAM, Page, shared_browser
 from tests.studio.played import modelled, write_system
-from tests.studio.served import served
+from tests.studio.served import load, served
 from tests.studio.test_page import ROOM, TEXT, block, view, written
 from tests.studio.test_watching import ROWS, press, row_of
 
@@ -50,7 +52,13 @@ IMU = """\
 TEXTS = {"empty": "project: {name: robot}\n", "five": system(1, IMU), "sixty": system(20)}
 
 
-def seen(place: Path, folder: Path, size: tuple[int, int], steps: Callable[[Page], Awaitable[None]]) -> None:
+def seen(
+    place: Path,
+    folder: Path,
+    size: tuple[int, int],
+    steps: Callable[[Page], Awaitable[None]],
+    prepare: Callable[[Studio], None] = lambda _: None,
+) -> None:
     """Open the page of a place in a window, and do the steps there."""
 
     async def all_steps(address: str) -> None:
@@ -67,6 +75,7 @@ def seen(place: Path, folder: Path, size: tuple[int, int], steps: Callable[[Page
             assert page.trouble == []
 
     with served(place, modelled()) as studio:
+        prepare(studio)
         asyncio.run(all_steps(studio.address))
 
 
@@ -231,3 +240,19 @@ def test_a_new_project_shows_five_settings(robot: Path, tmp_path: Path) -> None:
         await page.until("document.activeElement?.id === 'add-words'")
 
     seen(robot, tmp_path, (1400, 900), steps)
+
+
+def test_a_live_run_offers_its_views(tmp_path: Path) -> None:
+    """A run of `firm live` cannot be paused, and no simulation takes its place."""
+    spec = write_system(tmp_path)
+    run = Run(load(spec, spec.read_text(encoding="utf-8")), spec, "a node")
+
+    async def steps(page: Page) -> None:
+        buttons = "[...document.querySelectorAll('.run button')].map(item => item.textContent)"
+        await page.until(f"JSON.stringify({buttons}) === JSON.stringify(['messages', 'plots', 'status'])")
+        await press(page, "status")
+        await page.until("document.querySelector('.view').innerText.includes('no status block')")
+        run.end()
+        await page.until(f"{buttons}.includes('run')")
+
+    seen(spec, tmp_path, (1400, 900), steps, lambda studio: studio.live.take(run))
