@@ -124,8 +124,8 @@ export function shortened(text: string, room: number): string {
 function nodeOf(id: string, data: BlockWords, faults: Fault[]): BlockNode {
   const errors = faults.filter((fault) => fault.severity === "error").length;
   const isRail = data.kind === "manager";
-  // Beside the name: the icon, the word for the kind, and the number of faults.
-  const head = widthOf(data.name, true) + widthOf(data.kind) + (faults.length ? 74 : 48);
+  // Beside the name are an icon and the word for the kind, or in its place the numbers of faults: these move no block.
+  const head = widthOf(data.name, true) + widthOf(data.kind) + 48;
   const least = data.topics ? FACTS_WIDTH : LEAST_WIDTH;
   const width = Math.ceil(Math.min(MOST_WIDTH, Math.max(least, head, ...data.lines.map((line) => widthOf(line) + 1)) + SIDES));
   const label = `${data.kind} ${data.name}${faults.length ? `, ${faults.length} faults` : ""}`;
