@@ -40,7 +40,12 @@ def build_page(tell: Callable[[str], None]) -> None:
 def say_if_missing(tell: Callable[[str], None]) -> None:
     """Tell if there is no page to show."""
     if not _is_built():
-        tell(f"the page is not built, so the browser shows none: {_HINT}")
+        tell(f"the page is not built, so the browser shows none: {remedy()}")
+
+
+def remedy() -> str:
+    """Return how a missing page is obtained: by a build in a checkout, or by another wheel."""
+    return _HINT if _SOURCES.is_dir() else "install a wheel that was built after 'make studio'"
 
 
 def _is_built() -> bool:

@@ -17,7 +17,7 @@ from fusesoc_firm.studio.editing import Editing
 from fusesoc_firm.studio.evaluation import Evaluation
 from fusesoc_firm.studio.foxglove import FOXGLOVE
 from fusesoc_firm.studio.live import Live
-from fusesoc_firm.studio.page_files import PAGE
+from fusesoc_firm.studio.page_files import PAGE, remedy
 from fusesoc_firm.studio.requests import Handler, in_json
 from fusesoc_firm.studio.views import Views
 from fusesoc_firm.studio.workspace import Tools, Workspace
@@ -100,7 +100,7 @@ class Studio:
         try:
             text = (PAGE / "index.html").read_text(encoding="utf-8")
         except OSError:
-            text = "The page is not built; 'make studio' builds it.\n"
+            text = f"The page is not built: {remedy()}.\n"
         # The browser requests the first picture's data at once, before the page's program starts.
         headers = {"Link": "<api/outline>; rel=preload; as=fetch; crossorigin"}
         return web.Response(text=text, content_type="text/html", headers=headers)

@@ -81,3 +81,7 @@ def test_an_installation_has_no_sources(room: Path, monkeypatch: pytest.MonkeyPa
     told: list[str] = []
     page_files.build_page(told.append)
     assert told == []
+    page_files.say_if_missing(told.append)
+    assert told == [
+        "the page is not built, so the browser shows none: install a wheel that was built after 'make studio'"
+    ]
