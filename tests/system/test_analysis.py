@@ -217,6 +217,7 @@ def test_a_distribution_is_meant_for_its_own_version(tmp_path: Path, distro: str
 
 
 def test_an_unknown_distribution(tmp_path: Path) -> None:
+    read(tmp_path, specification(converter("s", "subscriber", "Point", "p") + converter("p", "publisher", "Point")))
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": "melodious"})
     with pytest.raises(InputError, match="unknown ROS distribution 'melodious'"):
         load_requested(request)
