@@ -82,7 +82,8 @@ class Library:
     def copy_to(self, folder: Path) -> None:
         """Let GHDL find what was analysed in another directory, too."""
         self.make()
-        for file in self.directory.glob("*.cf"):
+        # GHDL with LLVM or GCC has object files, too.
+        for file in (*self.directory.glob("*.cf"), *self.directory.glob("*.o")):
             shutil.copy(file, folder)
         analyses_in(folder).take(analyses_in(self.directory))
 
@@ -217,7 +218,7 @@ def _ghdl(command: Sequence[str], directory: Path | None = None) -> str:
 
 def _is_no_input(path: str) -> bool:
     """Whether a file is not read by a simulation: sources, which are inputs as such, and GHDL's own."""
-    return path.endswith((".vhd", ".cf"))
+    return path.endswith((".vhd", ".cf", ".o"))
 
 
 def _in_order(netlist: str) -> str:

@@ -49,7 +49,8 @@ ENTITY = re.compile(r"^entity (\w+) is$(.*?)^end", re.MULTILINE | re.IGNORECASE 
 GENERICS = re.compile(r"^  generic \((.*?)^  \);", re.MULTILINE | re.IGNORECASE | re.DOTALL)
 COMMENT = re.compile("--.*")
 # A bench needs its stimuli, a kernel its library in C++, and the ports of a top have bounds.
-NO_TOP = ("cannot open file", "cannot load VHPIDIRECT shared library", "cannot be at the top")
+NO_TOP = ("cannot open file", "cannot load VHPIDIRECT shared library", "cannot find ./", "cannot be at the top")
+LINKED = CORES / "sim" / "linker" / "libc.so.6"
 UNIT = re.compile(r"^(?:entity|package) (\w+) is$", re.MULTILINE | re.IGNORECASE)
 USED = re.compile(r"^\s*(?:use|\w+ : entity) (?:firm|work)\.(\w+)", re.MULTILINE | re.IGNORECASE)
 # Instead of the synchroniser of robot:cdc:firm_cdc_sync.
@@ -93,12 +94,14 @@ def firm(ghdl: str, standard: str, tmp_path_factory: pytest.TempPathFactory) -> 
     """All cores and their benches, analysed as the standard says; GHDL keeps a library for one standard only."""
     library = Library("firm", tmp_path_factory.mktemp(f"firm_{standard}"), standard, ghdl)
     library.analyse(in_order(set(CORES.rglob("*.vhd")) - {SIMULATED_SYNC}), *STRICT)
+    shutil.copy(LINKED, library.directory)
     return library
 
 
 def user_of(firm: Library, folder: Path) -> Library:
     """A library `work` in `folder`, which finds `firm`."""
     firm.copy_to(folder)
+    shutil.copy(LINKED, folder)
     return replace(firm, name="work", directory=folder)
 
 
