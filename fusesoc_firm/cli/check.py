@@ -90,14 +90,14 @@ def check_core_file(core: Path, *, may_run: bool = False) -> LoadedSystem | None
     return loaded
 
 
-def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) -> None:
+def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = (), *, with_core: bool = True) -> None:
     """Check the system `arguments.spec`, with further stimuli, and print a summary. May raise `InputError`."""
     from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
-    print_warnings(check_all(loaded, arguments.spec, stimuli))
+    print_warnings(check_all(loaded, arguments.spec, stimuli, with_core=with_core))
     system = loaded.system
     memory = memory_of(system, loaded.libraries)
     node = ethernet_node(system, loaded.libraries)
@@ -113,7 +113,12 @@ def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = ()) ->
 
 
 def check_all(
-    loaded: LoadedSystem, spec: Path, stimuli: Iterable[Path] = (), *, may_run: bool = False
+    loaded: LoadedSystem,
+    spec: Path,
+    stimuli: Iterable[Path] = (),
+    *,
+    with_core: bool = True,
+    may_run: bool = False,
 ) -> tuple[Diagnostic, ...]:
     """Check a loaded system, the core beside its specification, and what its simulation reads; return the warnings.
 
@@ -138,9 +143,10 @@ def check_all(
         ethernet_node(loaded.system, loaded.libraries)
     # What the user's model prints is not part of the answer.
     with faults.noting(), redirect_stdout(sys.stderr):
-        if core := core_of(spec):
+        core = core_of(spec) if with_core else None
+        if core:
             check_core(core, may_run=may_run)
-        else:
+        elif with_core:
             check_specs_of(spec.parent)
     faults.raise_if_any()
     return warnings

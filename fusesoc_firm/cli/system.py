@@ -58,7 +58,10 @@ def _add_new(actions: Any) -> None:
 
 
 def ask_for_system(arguments: argparse.Namespace) -> None:
-    """Ask for the keys of the specification `arguments.spec`, which is created or extended, and check it."""
+    """Ask for the keys of the specification `arguments.spec`, which is created or extended, and check it.
+
+    The core, stimuli and model may follow later.
+    """
     from fusesoc_firm.system.message_sources import known_names, sources_of
     from fusesoc_firm.system.scaffold.wizard import extend_specification
     from fusesoc_firm.text.prompts import asker
@@ -68,9 +71,9 @@ def ask_for_system(arguments: argparse.Namespace) -> None:
         return known_names(arguments.spec, paths, sources, core_folders)
 
     if arguments.spec.exists():
-        check_system(arguments)
+        check_system(arguments, with_core=False)
     extend_specification(arguments.spec, asker(), names)
-    check_system(arguments)
+    check_system(arguments, with_core=False)
 
 
 def _add_show(actions: Any) -> argparse.ArgumentParser:
