@@ -96,7 +96,9 @@ class Library:
 
         def run() -> RunResult:
             self._make(needed)
-            return RunResult(0, self._ghdl("--elab-run", entity, "--no-run", directory=self.directory))
+            # GHDL with LLVM or GCC writes a program, beside which may be a folder with the entity's name.
+            output = [] if "mcode" in self.version else ["-o", f"{entity}.program"]
+            return RunResult(0, self._ghdl("--elab-run", *output, entity, "--no-run", directory=self.directory))
 
         self._recalled(needed, ["--elab-run", entity], run)
 
