@@ -15,6 +15,9 @@ from typing import Any, NoReturn
 
 from fusesoc_firm.text.diagnostics import SourceRef, closest, fail
 
+Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+"""A function in a user's text."""
+
 _MODULE = "_user_code"
 
 
@@ -49,7 +52,7 @@ class UserFunction:
         results = [node for node in nodes if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom)]
         for found in ([item for item in words if id(item) in keys], words, results):
             if len(found) == 1:
-                return _place_of(self.path, found[0])
+                return place_of(self.path, found[0])
         return place_in(self.path, self._line())
 
     def _line(self) -> int:
@@ -107,25 +110,30 @@ def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: 
 
 def _own_nodes(path: Path, line: int) -> Iterator[ast.expr | ast.stmt]:
     """Yield the statements and expressions of the function that begins in a line, without those of inner functions."""
-    functions = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
     for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(function, functions) and _first_line(function) == line:
-            waiting: list[ast.AST] = [function.body] if isinstance(function, ast.Lambda) else [*function.body]
-            while waiting:
-                node = waiting.pop()
-                if isinstance(node, ast.expr | ast.stmt):
-                    yield node
-                waiting += [] if isinstance(node, functions) else ast.iter_child_nodes(node)
+        if isinstance(function, Function) and _first_line(function) == line:
+            yield from (node for node in nodes_of(function) if isinstance(node, ast.expr | ast.stmt))
             return
 
 
-def _first_line(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -> int:
+def nodes_of(function: Function) -> Iterator[ast.AST]:
+    """Yield the nodes of a function's body in their order, without those of the functions and classes in it."""
+    waiting: list[ast.AST] = [function.body] if isinstance(function, ast.Lambda) else [*function.body]
+    while waiting:
+        node = waiting.pop(0)
+        yield node
+        if not isinstance(node, Function | ast.ClassDef):
+            waiting[:0] = ast.iter_child_nodes(node)
+
+
+def _first_line(function: Function) -> int:
     """Return the line of a function as its code object has it: that of its first decorator."""
     decorators = [] if isinstance(function, ast.Lambda) else function.decorator_list
     return min([function.lineno, *(item.lineno for item in decorators)])
 
 
-def _place_of(path: Path, node: ast.expr | ast.stmt) -> SourceRef:
+def place_of(path: Path, node: ast.expr | ast.stmt) -> SourceRef:
+    """Return the place of a node in a user's file."""
     place = place_in(path, node.lineno)
     # The parser counts bytes of UTF-8.
     column = len(place.text.encode()[: node.col_offset].decode()) + 1

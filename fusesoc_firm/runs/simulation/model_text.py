@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.accelerator.user_code import fail_missing, place_in
+from fusesoc_firm.accelerator.user_code import fail_missing, nodes_of, place_in, place_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.runs.simulation.reference import ANSWER, NAME, PARAMETERS
 from fusesoc_firm.system.derived.python_function import definition, takes
@@ -69,8 +69,8 @@ def _check_imports(module: ast.Module, path: Path, faults: Diagnostics) -> None:
         for name in (item.partition(".")[0] for item in imported):
             beside = (path.parent / name, path.parent / f"{name}.py")
             if importlib.util.find_spec(name) is None and not any(map(Path.exists, beside)):
-                place = place_in(path, statement.lineno, statement.col_offset + 1)
-                faults.error(f"the model imports '{name}', which is not installed", place, "install it with pip")
+                message = f"the model imports '{name}', which is not installed"
+                faults.error(message, place_of(path, statement), "install it with pip")
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class _Answers:
 
     def _values(self) -> Iterator[ast.expr]:
         """Yield the values that the function returns, and lists with the values that it yields."""
-        for node in _own(self.function):
+        for node in nodes_of(self.function):
             match node:
                 case ast.Return(value=ast.expr() as value) | ast.YieldFrom(value=value):
                     yield value
@@ -130,7 +130,7 @@ class _Answers:
             uses = [node for node in ast.walk(self.function) if isinstance(node, ast.Name) and node.id == message.id]
             literals = [
                 node.value
-                for node in _own(self.function)
+                for node in nodes_of(self.function)
                 if isinstance(node, ast.Assign) and any(target in uses for target in node.targets)
             ]
             # The name is bound once, and used once: nothing else changes the message.
@@ -143,17 +143,7 @@ class _Answers:
         return keys if len(keys) == len(message.keys) else None
 
     def _note(self, message: str, node: ast.expr | ast.FunctionDef, hint: str = "") -> None:
-        self.faults.error(message, place_in(self.path, node.lineno, node.col_offset + 1), hint)
-
-
-def _own(function: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Yield the nodes of a function without those of the functions and classes in it."""
-    waiting: list[ast.AST] = [*function.body]
-    while waiting:
-        node = waiting.pop(0)
-        yield node
-        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
-            waiting[:0] = ast.iter_child_nodes(node)
+        self.faults.error(message, place_of(self.path, node), hint)
 
 
 def _items(value: ast.expr) -> Iterator[ast.expr]:

@@ -51,6 +51,8 @@ def faults(folder: Path, text: str) -> str:
             "def respond(b, m):\n    return [] if b else [('l', m)]\n",
             "2:27: error: 'respond'",
         ),
+        # A column counts characters.
+        ("def respond(b, m):\n    return [] if 'é' else [('l', m)]\n", "2:29: error: 'respond'"),
         (
             "def respond(b, m):\n    return {'left': m}\n",
             "2:12: error: 'respond' returns {'left': m}",
