@@ -11,6 +11,7 @@ import pytest
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.cli import main
 from fusesoc_firm.tools.programs import missing
+from tests.cli.tilt import begin_tilt
 
 Captured = pytest.CaptureFixture[str]
 BITSTREAM = Path("build/robot_sys_tilt_0.1.0/ulx3s/robot_sys_tilt_0.1.0.bit")
@@ -22,14 +23,8 @@ REPORT = {
 
 @pytest.fixture(autouse=True)
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
-    """A project in the current folder, and a machine with all programs of its builds."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("HOME", "XDG_CONFIG_HOME"):
-        monkeypatch.setenv(name, str(tmp_path))
-    monkeypatch.setenv("FUSESOC_CORES", "")
-    assert main(["init", "tilt", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Vector3"]) == 0
-    monkeypatch.chdir(tmp_path / "tilt")
-    capsys.readouterr()
+    """A project in the current folder."""
+    begin_tilt(tmp_path, monkeypatch, capsys)
 
 
 @pytest.fixture

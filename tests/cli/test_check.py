@@ -14,6 +14,7 @@ from fusesoc_firm.cli.check import check_all
 from fusesoc_firm.node.transport.built_simulator import _fail_for_units
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import InputError
+from tests.cli.tilt import begin_tilt
 
 Captured = pytest.CaptureFixture[str]
 
@@ -21,14 +22,7 @@ Captured = pytest.CaptureFixture[str]
 @pytest.fixture(autouse=True)
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> Path:
     """A project in the current folder."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("HOME", "XDG_CONFIG_HOME"):
-        monkeypatch.setenv(name, str(tmp_path))
-    monkeypatch.setenv("FUSESOC_CORES", "")
-    assert main(["init", "tilt", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Vector3"]) == 0
-    monkeypatch.chdir(tmp_path / "tilt")
-    capsys.readouterr()
-    return tmp_path / "tilt"
+    return begin_tilt(tmp_path, monkeypatch, capsys)
 
 
 def edit(file: str, old: str, new: str) -> None:
