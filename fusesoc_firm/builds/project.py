@@ -23,6 +23,7 @@ from fusesoc_firm.builds.setup.cores import (
     project_cores,
     target_calls,
 )
+from fusesoc_firm.builds.setup.outcome import configuration_file
 from fusesoc_firm.builds.setup.query import Answer
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.core.core_reader import core_name
@@ -68,7 +69,7 @@ def affected_since(revision: str) -> dict[str, str]:
 
 def _library_files(changed: Iterable[Path]) -> set[Path]:
     """Return the changed files that determine which cores FuseSoC finds."""
-    conf = Path(os.environ.get("FUSESOC_CONFIG") or "fusesoc.conf").resolve()
+    conf = configuration_file().resolve()
     return {path for path in changed if path == conf or path.name == "FUSESOC_IGNORE"}
 
 

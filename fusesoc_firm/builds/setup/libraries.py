@@ -7,7 +7,6 @@ version that the solver rejects, a virtual name that is not a name, an alias tha
 from __future__ import annotations
 
 import operator
-import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.builds.setup.outcome import configuration
+from fusesoc_firm.builds.setup.outcome import configuration, configuration_file
 from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.outputs import shown
@@ -46,7 +45,7 @@ def check_locations() -> None:
 
     FuseSoC would report only that dependencies conflict. The user's own configuration may list deleted projects.
     """
-    path = Path(os.environ.get("FUSESOC_CONFIG") or "fusesoc.conf")
+    path = configuration_file()
     faults, section = Diagnostics(), ""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
     found: dict[tuple[str, str], tuple[str, SourceRef]] = {}

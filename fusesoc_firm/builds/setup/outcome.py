@@ -67,6 +67,11 @@ def ignore(_build: Build, _try: int) -> None:
     """Ignore the start of a build."""
 
 
+def configuration_file() -> Path:
+    """Return the path of the FuseSoC configuration for the current folder, which may be missing."""
+    return Path(os.environ.get("FUSESOC_CONFIG") or "fusesoc.conf")
+
+
 def configuration() -> Any:
     """Return FuseSoC's configuration for the current folder, as the command `fusesoc` reads it."""
     from fusesoc.config import Config
