@@ -118,7 +118,7 @@ def checker(
 
     monkeypatch.setattr("fusesoc_firm.system.message_sources.libraries", shared)
     # A specification may be right and no longer fit its accelerators; tests/accelerator compares these.
-    monkeypatch.setattr("fusesoc_firm.cli.check.check_all", lambda *_: ())
+    monkeypatch.setattr("fusesoc_firm.cli.check.check_all", lambda *_, **__: ())
     own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
     return Checker(folder / spec.name, own, capsys)
 
