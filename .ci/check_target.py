@@ -11,6 +11,7 @@ import sys
 from collections.abc import Collection
 from typing import Any
 
+from fusesoc_firm.builds.setup.flows import target_flow
 from fusesoc_firm.builds.setup.plan import make_plan
 from fusesoc_firm.text.diagnostics import InputError, fail
 
@@ -30,8 +31,8 @@ def check(core: str, target: str, flows: Collection[str]) -> str:
 
 
 def _flow(core: Any, target: str) -> str:
-    flags = core.get_flags(target)
-    return str(core.get_flow({**flags, "target": target}) or flags.get("tool"))
+    flow = target_flow(core, target)
+    return flow.name if flow else "None"
 
 
 if __name__ == "__main__":

@@ -44,6 +44,12 @@ class CoreFile:
         parameters = self.section("generate").get(instance, {}).get("parameters")
         return parameters if isinstance(parameters, dict) else {}
 
+    def replaced(self, target: str, instance: str) -> dict[str, Any]:
+        """Return the parameters of a generator instance that a target replaces. May raise `InputError`."""
+        uses = self.section("targets").get(target, {}).get("generate") or ()
+        found = [use[instance] for use in uses if isinstance(use, dict) and isinstance(use.get(instance), dict)]
+        return found[0] if found else {}
+
     def item(self, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
         """Return the key and value nodes of an item in nested mappings, as written, or None if it is missing."""
         return pair_of(self.text.root, *keys)

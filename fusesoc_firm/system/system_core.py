@@ -72,6 +72,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import render
 from fusesoc_firm.text.yaml_text import Text
+from fusesoc_firm.tools.flows import Flow
 from fusesoc_firm.tools.reads import Input
 
 # FuseSoC's file types of Verilog by suffix, and the suffixes of files that are not compiled separately.
@@ -296,8 +297,13 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     files |= _sources(system.accelerator_types, loaded.folder)
     files |= {path: made[path] for path in after}
     if loaded.board:
-        files |= _board_files(loaded, loaded.board)
+        files |= _board_files(loaded, loaded.board) | flow_file(loaded.board.edalize_flow)
     return GeneratedCore(f"System {system.name}", files)
+
+
+def flow_file(flow: Flow) -> dict[str, GeneratedFile]:
+    """Return the file with the flow of a target that uses the generated core."""
+    return {flow.file_name(): GeneratedFile(flow.text(), "user")}
 
 
 def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:

@@ -37,8 +37,8 @@ class Simulator:
     reads_vhdl: bool = False
     calls_functions: bool = False
     programs: tuple[str, ...] = ()
-    options: Mapping[str, str] = field(default_factory=dict)
-    system_verilog: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, str | list[str]] = field(default_factory=dict)
+    system_verilog: Mapping[str, str | list[str]] = field(default_factory=dict)
     live: Live | None = None
     waves: str = "waves.vcd"
     wave_options: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ SIMULATORS: dict[str, Simulator] = {
         reads_vhdl=True,
         calls_functions=True,
         programs=("ghdl",),
-        options={"sim_options": "[--ieee-asserts=disable-at-0]"},
+        options={"sim_options": ["--ieee-asserts=disable-at-0"]},
         # FuseSoC does not build anything before the run. The makefile's line contains the options of the analysis.
         live=Live("-g", "analyze", "ghdl -r "),
         waves="waves.ghw",
@@ -59,7 +59,7 @@ SIMULATORS: dict[str, Simulator] = {
         "Icarus Verilog",
         ", of the netlist that GHDL makes of the VHDL",
         programs=("iverilog",),
-        system_verilog={"iverilog_options": "[-g2012]"},
+        system_verilog={"iverilog_options": ["-g2012"]},
         # Edalize starts the simulator with `-fst`.
         waves="waves.fst",
     ),
@@ -69,8 +69,8 @@ SIMULATORS: dict[str, Simulator] = {
         programs=("verilator", "g++", "make"),
         options={
             "mode": "cc",
-            "verilator_options": "[--main, --timing, --timescale 1ns/1ps, -Wno-lint, -Wno-style]",
-            "make_options": "[OPT_FAST=-O2]",
+            "verilator_options": ["--main", "--timing", "--timescale 1ns/1ps", "-Wno-lint", "-Wno-style"],
+            "make_options": ["OPT_FAST=-O2"],
         },
         live=Live("+"),
         wave_options=("--verilator_options=--trace",),

@@ -150,7 +150,7 @@ def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
         given |= instance.get("simulation", {}) if isinstance(instance, dict) else {}
     spec, stimuli, model = (core.parent / given.pop(name) for name in ("spec", "stimuli", "model"))
     # The simulators of accelerators in Verilog have their bench in Verilog, too.
-    is_vhdl = sections["targets"]["sim"]["flow_options"]["tool"] == "ghdl"
+    is_vhdl = given.get("simulator", "ghdl") == "ghdl"
     made = write(call(spec, stimuli, model, **given), tmp_path) if is_vhdl else generate_system(spec, tmp_path)
     names = {path.name for path in made}
     others = [path for path in spec.parent.rglob("*.vhd") if path.name not in names]

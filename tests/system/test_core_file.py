@@ -84,7 +84,6 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
         "model": "says.py",
         "environment": ["tb/a.vhd", "tb/b.vhd"],
     }
-    assert found["targets"]["sim_icarus"]["flow_options"]["ghdlsynth_top"] == "robot_system_in_environment"
 
 
 def test_a_core_that_depends_on_the_generators_of_converters_alone_is_refused(tmp_path: Path) -> None:
@@ -108,20 +107,55 @@ def test_a_new_core_without_options_is_whole(tmp_path: Path) -> None:
     assert found["generate"]["simulation"]["parameters"]["stimuli"] == "stimuli.yaml"
     assert set(found["targets"]) == {"default", "lint", *SIMULATION, *SYNTHESIS}
     assert all("description" in target for name, target in found["targets"].items() if name != "default")
-    assert found["targets"]["sim"]["flow_options"]["tool"] == "ghdl"
+    assert found["targets"]["sim"]["generate"] == ["system", "simulation"]
+
+
+def test_a_new_core_is_short_enough_to_be_read(tmp_path: Path) -> None:
+    options = CoreOptions(depend=["robot:acc:firm_float"])
+    lines = new_core(system(tmp_path), "robot.yaml", options).splitlines()
+    assert len(lines) <= 60
+    assert max(map(len, lines)) <= 120
+
+
+def test_targets_of_a_kind_differ_in_what_they_generate(tmp_path: Path) -> None:
+    targets = content(new_core(system(tmp_path), "robot.yaml", CoreOptions()))["targets"]
+    first, other = targets["ulx3s"], targets["zcu104"]
+    assert other == first | {"generate": [{"system": {"board": "zcu104"}}], "toplevel": "robot_zcu104_wrapper"}
+    verilator = targets["sim"] | {
+        "flags": {"firm_launcher": True, "verilog_host": True},
+        "generate": ["system", {"simulation": {"simulator": "verilator"}}],
+    }
+    assert targets["sim_verilator"] == verilator
+    assert targets["synth_gowin"] == targets["synth_xilinx"] | {"flow_options": {"family": "gowin"}}
+    assert targets["emulate"]["generate"] == [
+        {"system": {"interconnect": "uart", "clock": "10 MHz"}},
+        {
+            "simulation": {
+                "product": "live",
+                "simulator": "verilator",
+                "interconnect": "uart",
+                "clock": "10 MHz",
+            }
+        },
+    ]
+
+
+def test_words_with_commas_and_quotes_stay_whole(tmp_path: Path) -> None:
+    options = CoreOptions(stimuli="a, b.yaml", model="it's {1}.py", paths=["x: y", "#z"])
+    parameters = content(new_core(system(tmp_path), "a, b: c.yaml", options))["generate"]["simulation"]["parameters"]
+    assert parameters == {
+        "spec": "a, b: c.yaml",
+        "paths": ["x: y", "#z"],
+        "product": "simulation",
+        "stimuli": "a, b.yaml",
+        "model": "it's {1}.py",
+    }
 
 
 def test_a_system_with_verilog_is_simulated_with_icarus(tmp_path: Path) -> None:
     found = content(new_core(system(tmp_path, "Verilog", "acc.v"), "robot.yaml", CoreOptions()))
-    assert found["targets"]["sim"]["flow_options"]["tool"] == "icarus"
+    assert found["targets"]["sim"]["generate"] == ["system", {"simulation": {"simulator": "icarus"}}]
     assert found["targets"]["sim_icarus"] == found["targets"]["sim"]
-    assert "iverilog_options" not in found["targets"]["sim"]["flow_options"]
-
-
-def test_icarus_is_told_of_system_verilog(tmp_path: Path) -> None:
-    (tmp_path / "acc.sv").touch()
-    found = content(new_core(system(tmp_path, "Verilog", "acc.v, acc.sv"), "robot.yaml", CoreOptions()))
-    assert found["targets"]["sim_icarus"]["flow_options"]["iverilog_options"] == ["-g2012"]
 
 
 def test_what_is_the_authors_own_stays(tmp_path: Path) -> None:
@@ -130,15 +164,25 @@ def test_what_is_the_authors_own_stays(tmp_path: Path) -> None:
     parameters = "\nparameters:\n  x: {paramtype: generic, datatype: int}\n"
     text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
     text = text.replace("description: System robot", "description: Mine  # and this")
-    text = text.replace("      tool: ghdl", "      tool: modelsim")
+    text = text.replace("flow: firm", "flow: sim", 1)
     path.write_text(text.replace("\n  sim_icarus:", f"\n{target}\n  sim_icarus:") + parameters, encoding="utf-8")
     updated = updated_core(system(tmp_path), path)
     path.write_text(updated, encoding="utf-8")
     assert "description: Mine  # and this" in updated
-    assert "tool: modelsim" not in updated
+    assert "flow: sim" not in updated
     assert updated.endswith(f"\n\n{target}{parameters}")
     assert set(content(updated)["targets"]) == {"default", "lint", "desk", *SIMULATION, *SYNTHESIS}
     assert updated_core(system(tmp_path), path) == updated
+
+
+def test_a_target_that_is_no_longer_written_keeps_no_anchor(tmp_path: Path) -> None:
+    path = tmp_path / "robot.core"
+    text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
+    path.write_text(text.replace("\n  icebreaker: &board {", "\n  desk: &board {"), encoding="utf-8")
+    updated = updated_core(system(tmp_path), path)
+    found = content(updated)["targets"]
+    assert found["desk"] == found["icebreaker"]
+    assert updated.count("&board") == 1
 
 
 def test_without_a_simulation_there_is_no_target_for_it(tmp_path: Path) -> None:

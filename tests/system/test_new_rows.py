@@ -19,14 +19,14 @@ SPECS = Path(__file__).resolve().parents[2] / "specs"
 ROWS = """\
 from pathlib import Path
 from fusesoc_firm.system.boards import board
-from fusesoc_firm.system.scaffold import core_file
+from fusesoc_firm.tools.flows import FAMILIES, Family
 from fusesoc_firm.tools.simulators import SIMULATORS, Live, Simulator
 
 SIMULATORS["xcelium"] = Simulator(
     "Xcelium", ", of which this test knows the name alone", reads_vhdl=True, programs=("xrun",),
-    options={"xrun_options": "[-v93]"}, live=Live("-generic "),
+    options={"xrun_options": ["-v93"]}, live=Live("-generic "),
 )
-core_file.FAMILIES.append({"name": "nexus", "description": "Lattice Nexus", "options": "[-noflatten]"})
+FAMILIES["nexus"] = Family("Lattice Nexus", ("-noflatten",))
 board.FOLDER = Path(__file__).parent / "boards"
 """
 CONFIGURATION = f"""\
@@ -73,7 +73,7 @@ def test_rows_and_files_are_all_that_it_takes(project: Path) -> None:
     firm(project, "system", "core", "robot/quat2euler.yaml")
     after = yaml.safe_load(core.read_text())["targets"]
     assert after.keys() - before.keys() == {*NEW}
-    assert after["sim_xcelium"]["flow_options"] == {"tool": "xcelium", "xrun_options": ["-v93"]}
+    assert after["sim_xcelium"] == after["sim"] | {"generate": ["system", {"simulation": {"simulator": "xcelium"}}]}
     assert "{ghdl,verilator,xcelium}" in firm(project, "simulator", "--help")
     firm(project, "build", "quat2euler", "--setup", "--target", *NEW)
     made = {path.parent.name: path for path in project.glob("build/*/*/*.eda.yml")}
@@ -84,3 +84,5 @@ def test_rows_and_files_are_all_that_it_takes(project: Path) -> None:
     assert "quat2euler_system_live.vhd" in files["live_xcelium"]
     assert "quat2euler_system.vhd" in files["synth_nexus"]
     assert "quat2euler_desk.vhd" in files["desk"]
+    assert "-v93" in (made["sim_xcelium"].parent / "xrun.f").read_text()
+    assert "synth_nexus -noflatten" in (made["synth_nexus"].parent / "edalize_yosys_procs.tcl").read_text()

@@ -14,9 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from fusesoc_firm.core.request import Request
+from fusesoc_firm.tools.simulators import SIMULATORS
 from tests.applications.applications import SPECS
 from tests.hdl.verilog import compile_verilog, translated
 from tests.system.simulated import systems
@@ -140,9 +139,8 @@ def _icarus(folder: Path) -> list[str]:
 
 
 def _verilator(folder: Path) -> list[str]:
-    """Built with the options of the system's core."""
-    text = (SPECS / "quat2euler" / "quat2euler.core").read_text(encoding="utf-8").replace("CAPI=2:", "")
-    options = yaml.safe_load(text)["targets"]["sim_verilator"]["flow_options"]
+    """Built with the options of the target sim_verilator."""
+    options = SIMULATORS["verilator"].options
     top, files = translated(_request(), folder, *_CORES)
     words = [word for option in options["verilator_options"] for word in option.split()]
     command = ["verilator", "--cc", "--exe", *words, "--Mdir", str(folder), "--top-module", top, *map(str, files)]

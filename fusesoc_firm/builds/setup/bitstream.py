@@ -6,8 +6,8 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from fusesoc_firm.builds.setup.flows import target_flow
 from fusesoc_firm.builds.setup.logged_run import add_libraries
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.setup.plan import make_plan
@@ -85,8 +85,12 @@ def board_builds(core: str, folder: Path | None) -> list[BoardBuild]:
     add_libraries(core, folder)
     plan = make_plan([core], ["*"])
     found = plan.fusesoc.get_core(plan.builds[0].core)
-    flows = {build: _flow(found, build.target) for build in plan.builds}
-    builds = [BoardBuild(Path(found.core_file), build, flow) for build, flow in flows.items() if flow in _FLOWS]
+    flows = {build: target_flow(found, build.target) for build in plan.builds}
+    builds = [
+        BoardBuild(Path(found.core_file), build, flow.name)
+        for build, flow in flows.items()
+        if flow and flow.name in _FLOWS
+    ]
     if not builds:
         fail(f"{core} has no target for a board", hint="'firm system core SPEC' adds one for each board that fits")
     return builds
@@ -106,8 +110,3 @@ def choose(builds: Sequence[BoardBuild], board: str | None) -> BoardBuild:
         reason = f"did you mean '{near}'? " if near else "the system does not fit it; " * (board in boards())
         fail(f"{file} has no board '{board}'", hint=f"{reason}boards of {file}: {names}")
     return known[board]
-
-
-def _flow(core: Any, target: str) -> str:
-    flags = core.get_flags(target)
-    return str(core.get_flow({**flags, "target": target}) or "")

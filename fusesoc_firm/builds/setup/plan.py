@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.setup.cores import calls_of, fetch, solved
+from fusesoc_firm.builds.setup.flows import flow_of
 from fusesoc_firm.builds.setup.libraries import check_files, ignored, open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
@@ -194,8 +195,8 @@ def _tests(fusesoc: Any, name: str, further: Mapping[str, Any], selected: Collec
     for target in core.get_data({}).targets:
         if target.startswith(TESTS) or target in selected:
             flags = {**core.get_flags(target), "target": target, **further}
-            flow = core.get_flow(flags)
-            if flow == "sim" or (not flow and flags.get("tool") in SIMULATORS):
+            flow = flow_of(core, flags)
+            if flow and (flow.name in SIMULATORS if flow.is_tool else flow.name == "sim"):
                 found[target] = flags
     return found
 

@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore, short
+from fusesoc_firm.builds.setup.flows import target_flow
 from fusesoc_firm.builds.setup.libraries import newest, open_libraries
 from fusesoc_firm.builds.setup.selection import matching
 from fusesoc_firm.text.diagnostics import fail
@@ -188,16 +189,16 @@ def _targets(patterns: Sequence[str]) -> list[tuple[str, str, str]]:
     cores = open_libraries().get_cores()
     chosen = dict.fromkeys(name for pattern in patterns for name in named(sorted(cores), pattern))
     return [
-        (name, target, _kind(section))
+        (name, target, _kind(cores[name], target))
         for name in chosen
-        for target, section in sorted(cores[name].get_data({}).targets.items())
+        for target in sorted(cores[name].get_data({}).targets)
     ]
 
 
-def _kind(target: Any) -> str:
-    options = target.flow_options or {}
-    parts = [target.flow, options.get("tool") if isinstance(options, dict) else None]
-    return "/".join(filter(None, parts)) if target.flow else str(target.default_tool or "-")
+def _kind(core: Any, target: str) -> str:
+    if not (flow := target_flow(core, target)):
+        return "-"
+    return "/".join(dict.fromkeys(filter(None, (flow.name, flow.tool))))
 
 
 def _reached(names: Iterable[str], edges: Mapping[str, Sequence[str]]) -> set[str]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.builds.setup.flows import target_flow
 from fusesoc_firm.builds.setup.logged_run import add_libraries, run_logged
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.setup.plan import make_plan
@@ -170,7 +171,6 @@ def _options(wishes: Wishes, simulator: Simulator) -> Iterator[str]:
 
 def _targets(core: Any) -> dict[str, str]:
     """Return the simulation targets of a core with their simulators, the default first."""
-    targets = core.get_data({}).targets
-    names = [name for name in targets if name == "sim" or name.startswith("sim_")]
-    tools = {name: str((getattr(targets[name], "flow_options", None) or {}).get("tool", "")) for name in sorted(names)}
-    return {name: tool for name, tool in tools.items() if tool in SIMULATORS}
+    names = sorted(name for name in core.get_data({}).targets if name == "sim" or name.startswith("sim_"))
+    flows = {name: target_flow(core, name) for name in names}
+    return {name: flow.tool for name, flow in flows.items() if flow and not flow.is_tool and flow.tool in SIMULATORS}

@@ -12,11 +12,11 @@ import os
 import subprocess
 import sys
 from copy import deepcopy
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.step.bench import bench_of
+from fusesoc_firm.builds.step.flow import backend, resolved
 from fusesoc_firm.builds.step.output import each_line
 
 
@@ -24,9 +24,10 @@ def main(arguments: list[str]) -> int:
     """Run the step; return the exit status."""
     step, api, name, edam = arguments
     try:
+        build = resolved(api, name, _read(edam), ".")
         if step == "build":
-            _backend(api, name, _read(edam)).build()
-        elif fault := _run(api, name, _read(edam)):
+            _backend(*build).build()
+        elif fault := _run(*build):
             print(f"error: not passed: {fault}", flush=True)
             return 1
     except RuntimeError as error:
@@ -42,14 +43,14 @@ def _run(api: str, name: str, edam: dict[str, Any]) -> str:
         return ""
     configured = deepcopy(edam)
     bench.prepare()
-    backend = _backend(api, name, edam)
+    made = _backend(api, name, edam)
     if edam != configured:
-        backend.configure()
+        made.configure()
     with each_line(bench.see):
         # Of Edalize's flows, that of Verilator runs neither of the two hooks, and the others only the first.
         if api == "flow" and edam["flow_options"].get("tool") == "verilator":
             _run_hook("pre_run", edam)
-        backend.run()
+        made.run()
         if api == "flow":
             _run_hook("post_run", edam)
     return bench.verdict()
@@ -70,12 +71,7 @@ def _read(edam: str) -> Any:
 
 
 def _backend(api: str, name: str, edam: dict[str, Any]) -> Any:
-    where = {"edam": edam, "work_root": str(Path.cwd()), "verbose": False}
-    if api == "flow":
-        return getattr(import_module(f"edalize.flows.{name}"), name.capitalize())(**where)
-    from edalize.edatool import get_edatool
-
-    return get_edatool(name)(**where)
+    return backend(api, name, edam, str(Path.cwd()))
 
 
 if __name__ == "__main__":

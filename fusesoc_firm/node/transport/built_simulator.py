@@ -150,7 +150,7 @@ def _build(spec: Path, core: CoreFile, target_and_tool: tuple[str, str], work: P
     targets, (target, tool) = core.section("targets"), target_and_tool
     if target not in targets:
         fail(f"{core.path} has no target '{target}'", hint=f"run 'firm system core {spec}' to add the target")
-    made_with = targets[target].get("flow_options", {}).get("tool", tool)
+    made_with = core.replaced(target, "simulation").get("simulator", default_simulator())
     if made_with != tool:
         fail(f"target '{target}' of {core.path} is for {made_with}", hint=f"use --tool {made_with}")
     _run(spec, fusesoc_run(core, target, work, "--setup", "--build"), project_folder(spec))

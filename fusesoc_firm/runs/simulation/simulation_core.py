@@ -44,12 +44,14 @@ from fusesoc_firm.system.hardware.verilog_bench import (
     verilog_bench_configuration,
 )
 from fusesoc_firm.system.hardware.waits import watched_entity
-from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.system.system_core import LoadedSystem, flow_file
 from fusesoc_firm.system.written.specification import NETWORKS
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.text.render import Context, render
+from fusesoc_firm.tools.flows import simulator_flow
 from fusesoc_firm.tools.reads import Input
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
+from fusesoc_firm.tools.yosys import is_system_verilog
 
 # The number of messages to which the model responds in a check.
 _MOST_CHECKED = 100
@@ -82,7 +84,7 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     assert isinstance(stall_percent, int)
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, seed, stall_percent, _entity(environment), is_live=False)
-    files = _surroundings(loaded, environment)
+    files = _surroundings(loaded, environment, str(request.parameters["simulator"]))
     if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
         files |= _vhdl_bench(configuration)
     else:
@@ -170,7 +172,7 @@ def _with_open_end(request: Request, loaded: LoadedSystem, vhdl: str, verilog: s
     system = loaded.system
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
-    files = _surroundings(loaded, environment)
+    files = _surroundings(loaded, environment, str(request.parameters["simulator"]))
     if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
         return files | _vhdl_bench(configuration, vhdl)
     return files | _verilog_bench(configuration, system, template=verilog)
@@ -186,9 +188,13 @@ def _refuse_node(loaded: LoadedSystem) -> None:
         )
 
 
-def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]) -> dict[str, GeneratedFile]:
-    """Return the files that every test bench of a system needs: simulation kernels and the environment."""
-    files: dict[str, GeneratedFile] = {}
+def _surroundings(
+    loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile], simulator: str
+) -> dict[str, GeneratedFile]:
+    """Return the files that every test bench of a system needs: its flow, simulation kernels and the environment."""
+    sources = [Path(source) for item in loaded.system.accelerator_types for source in item.accelerator.sources]
+    unit = translated_unit(loaded.system, has_environment=bool(environment))
+    files = flow_file(simulator_flow(simulator, unit, is_system_verilog=is_system_verilog(sources)))
     for kernel in loaded.system.kernels:
         files |= kernel_files(kernel, loaded.folder)
     return files | {str(path): file for path, file in environment.items()}

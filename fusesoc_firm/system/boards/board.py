@@ -33,6 +33,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.text.naming import identifier, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
+from fusesoc_firm.tools.flows import NETLIST, Flow
 
 FOLDER = Path(__file__).resolve().parents[2] / "boards"
 BOARD_TEMPLATE = "vhdl/board.vhd"
@@ -125,6 +126,23 @@ class Board(Section):
         return self.flow in FLOWS
 
     @property
+    def edalize_flow(self) -> Flow:
+        """The flow that builds for the board, with its options; Edalize does not have one for Quartus."""
+        options: dict[str, str | Sequence[str] | None] = {
+            "frontends": [NETLIST] if self.is_linked else None,
+            "part": self.part,
+            "board_part": self.board_part,
+            # Only if Vivado manages the sources can a block design refer to modules by name.
+            "source_mgmt_mode": "All" if self.flow == VIVADO else None,
+            "yosys_synth_options": self.synth_options,
+            "nextpnr_options": self.nextpnr_options,
+            "device": self.device,
+            "family" if self.flow == QUARTUS else "device_family": self.device_family,
+        }
+        plain = {name: _plain(value) for name, value in options.items() if value}
+        return Flow(str(self.flow), plain, is_tool=self.flow == QUARTUS)
+
+    @property
     def clock_port(self) -> str:
         """The port of the pin with the board's clock."""
         return _OSCILLATOR if self.oscillator else _CLOCK
@@ -162,6 +180,11 @@ def _bits(name: str, width: int | None) -> list[str]:
 def boards() -> tuple[str, ...]:
     """Return the names of the package's boards."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def _plain(value: str | Sequence[str]) -> str | list[str]:
+    """Return a text or texts without their places."""
+    return str(value) if isinstance(value, str) else list(map(str, value))
 
 
 def board_path(name: str, folder: Path) -> Path:

@@ -9,33 +9,26 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.core.core_reader import read_core
-from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, Board, board_entity, boards, read_board
+from fusesoc_firm.system.boards.board import VIVADO, Board, board_entity, boards, read_board
 from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.hardware.verilog_bench import translated_unit
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, LINKS
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
-from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
+from fusesoc_firm.text.quoting import yaml_list
 from fusesoc_firm.text.render import render
-from fusesoc_firm.tools.simulators import SIMULATORS, Simulator, default_simulator, fitting
+from fusesoc_firm.tools.flows import FAMILIES, simulator_flow
+from fusesoc_firm.tools.simulators import default_simulator, fitting
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 BENCH_TEMPLATE = "core/cocotb.core"
 
-# Yosys' names of FPGA families, with the options of the synth command: each family gets a target synth_<name>.
-FAMILIES = [
-    {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
-    {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
-    {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
-    {"name": "gowin", "description": "Gowin", "options": "[]"},
-]
 # The generator instances that the targets use.
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the core that had this generator before version 0.2.0.
@@ -47,9 +40,13 @@ EMULATED = {"interconnect": "uart", "clock": "10 MHz"}
 # The target of a simulated board with a chip or a PHY, and its clock: the node runs roughly at the pace of its peers.
 NETWORK = "network"
 NETWORK_HERTZ = {**dict.fromkeys(CHIPS, 1_000_000), ETHERNET: 250_000}
+# The longest line of a target, unless one word is longer.
+_COLUMNS = 118
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines separate targets.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
+# The anchor of a target; those of the product's kinds are defined by the first target of a kind.
+_ANCHOR = re.compile(r"^(  \S+:) &(?:sim|live|network|emulate|synth|board)(?= )", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -90,22 +87,25 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
     """Return the text of a new `.core` for `spec`, a specification in the same folder; may raise `InputError`."""
     if fault := text_fault(options.description):
         fail(f"--description {fault[0]}", hint=fault[1])
-    further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
+    common = {"spec": spec, "paths": _paths(options.paths), "distro": options.distro}
+    simulation = {
+        "product": "simulation",
+        "stimuli": options.stimuli,
+        "model": options.model,
+        "environment": _paths(options.environment),
+    }
     head = render(
         HEAD_TEMPLATE,
         {
             "name": options.name or f"robot:sys:{system.name}:0.1.0",
             "description": options.description or f"System {system.name}",
             "depend": list(options.depend),
-            "spec": spec,
-            "options": [{"name": name, "value": value} for name, value in further.items() if value],
-            "stimuli": options.stimuli,
-            "model": options.model,
-            "environment": {"files": _paths(options.environment)} if options.environment else None,
+            "system": f"{{{_mapping(common)}}}",
+            "simulation": _mapping(simulation),
             "bench": {"files": [options.bench, spec, options.stimuli, options.model]} if options.bench else None,
         },
     )
-    targets = _targets(system, is_simulated=True, has_environment=bool(options.environment))
+    targets = _targets(system, is_simulated=True)
     return head + targets + (_bench_targets(system, options.bench) if options.bench else "")
 
 
@@ -119,9 +119,12 @@ def _bench_targets(system: DerivedSystem, bench: str) -> str:
             "name": "test_cocotb" if is_first else f"test_cocotb_{name}",
             "title": item.title,
             "module": PurePosixPath(bench).stem,
-            "simulator": name,
-            "options": _options({**item.system_verilog, **item.options}),
-            "translated": None if item.reads_vhdl else {"unit": system.entity},
+            "options": _mapping(
+                {
+                    "cocotb_module": PurePosixPath(bench).stem,
+                    **simulator_flow(name, system.entity, is_system_verilog=True).options,
+                }
+            ),
         }
         for is_first, (name, item) in zip((True, False, False), known.items(), strict=False)
     ]
@@ -146,167 +149,171 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
         fail(
             f"{path} has no instance '{_SYSTEM}' under 'generate'", hint="remove the file, then run this command again"
         )
-    is_simulated = _SIMULATION in instances
-    has_environment = is_simulated and bool(core.parameters(_SIMULATION).get("environment"))
-    targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)
+    targets = _targets(system, is_simulated=_SIMULATION in instances)
     if not (section := _SECTION.search(text)):
         return f"{text.rstrip()}\n\n{targets}"
     names = _TARGET.findall(targets)
-    own = [target[0].strip("\n") for target in _TARGET.finditer(section[1]) if target[1] not in names]
+    # A target that the product wrote earlier, such as of a board that no longer fits, may have an anchor of these.
+    own = [_ANCHOR.sub(r"\1", item[0].strip("\n")) for item in _TARGET.finditer(section[1]) if item[1] not in names]
     rest = text[section.end() :]
     return text[: section.start()] + "\n\n".join([targets.rstrip("\n"), *own]) + "\n" + (f"\n{rest}" if rest else "")
 
 
-def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
+def _targets(system: DerivedSystem, *, is_simulated: bool) -> str:
     has_kernels = bool(system.kernels)
-    unit = translated_unit(system, has_environment=has_environment)
+    kinds = [*(_simulations(system) if is_simulated else ()), *_reports(system), _boards(system)]
     return render(
         TARGETS_TEMPLATE,
         {
             "entity": system.entity,
-            "simulations": [
-                target
-                for kind in (_kinds(system) if is_simulated else ())
-                for target in _simulations(system, unit, kind)
-            ],
-            "emulation": _emulation(system, unit) if is_simulated else None,
+            "kinds": [kind.context() for kind in kinds if kind.targets],
             # Only an HLS tool generates kernels, so there is no netlist of the whole system.
             "has_kernels": has_kernels,
-            "families": [] if has_kernels else FAMILIES,
-            "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
         },
     )
 
 
 @dataclass(frozen=True)
-class _Kind:
-    """A kind of simulation: its name, its flag for Verilog simulators, and the suffix of its test bench.
+class _Target:
+    """A target: the words that set it apart from the others of its kind, its top level, and a flag for the simulation.
 
-    `product` and `replaced` are further parameters of the generator; `replaced` also applies to the system's generator.
+    Words are entries of a mapping in YAML, or parts of one at whose commas the line may end.
     """
 
     name: str
-    flag: str
-    suffix: str
-    product: str = ""
-    replaced: Mapping[str, str] = field(default_factory=dict)
+    words: Sequence[str]
+    toplevel: str
+    flag: str = ""
 
     @property
-    def is_live(self) -> bool:
-        """Whether another program starts the simulator."""
-        return bool(self.product)
+    def flags(self) -> str:
+        """The entry with the flags."""
+        return f"flags: {{{', '.join(f'{name}: true' for name in ('firm_launcher', self.flag) if name)}}}"
 
 
-def _kinds(system: DerivedSystem) -> list[_Kind]:
-    """Return the kinds of simulations; in the first two, streams replace a node in fabric."""
+@dataclass(frozen=True)
+class _Kind:
+    """Targets that inherit from the first one; `alias` is a further name of the first target."""
+
+    name: str
+    description: str
+    targets: Sequence[_Target]
+    alias: str = ""
+
+    def context(self) -> dict[str, object]:
+        """Return the data for the template."""
+        first, *others = self.targets
+        texts = [_wrapped(f"{first.name}: &{self.name}", self._words_of(first))]
+        texts += [_wrapped(f"{target.name}:", self._changed(target, first)) for target in others]
+        return {"kind": self.name, "targets": texts, "alias": self.alias}
+
+    def _words_of(self, target: _Target) -> list[str]:
+        begin = ["<<: *default", "flow: firm", target.flags]
+        return [*begin, *target.words, f"toplevel: {target.toplevel}", f'description: "{self.description}"']
+
+    def _changed(self, target: _Target, first: _Target) -> list[str]:
+        flags = [target.flags] if target.flags != first.flags else []
+        toplevel = [f"toplevel: {target.toplevel}"] if target.toplevel != first.toplevel else []
+        return [f"<<: *{self.name}", *flags, *target.words, *toplevel]
+
+
+def _wrapped(begin: str, words: Sequence[str]) -> str:
+    """Return a target as a mapping in YAML, on few lines; none starts with the end of a word."""
+    text, line = "", f"  {begin} {{{words[0]}"
+    for word in words[1:]:
+        if len(line) + len(word) + 3 > _COLUMNS:
+            text, line = f"{text}{line},\n", f"    {word}"
+        else:
+            line += f", {word}"
+    return f"{text}{line}}}".removeprefix("  ")
+
+
+def _simulations(system: DerivedSystem) -> Iterator[_Kind]:
+    """Yield the kinds of simulations; in the first two, streams replace a node in fabric."""
     streams = {"interconnect": AXI_STREAM} if system.network else {}
-    kinds = [
-        _Kind("sim", "verilog_host", "tb", replaced=streams),
-        _Kind("live", "verilog_pipe", "live", "live", streams),
-    ]
+    yield _simulation(system, "sim", "Simulate, and compare every byte with the model", "verilog_host", streams)
+    text = "Build a simulator that another program starts and sends frames to"
+    yield _simulation(system, "live", text, "verilog_pipe", streams)
     if system.network:
         way = system.network.kind.value
         flag = "verilog_chip" if way in CHIPS else "verilog_phy"
         clock = {"clock": f"{NETWORK_HERTZ[way] / 10**6:g} MHz"}
-        kinds.append(_Kind(NETWORK, flag, "network", "network", clock))
-    return kinds
+        text = "Build the simulated board of firm live, behind the pins of its network"
+        yield _simulation(system, NETWORK, text, flag, clock)
+    yield _emulation(system)
 
 
-def _simulations(system: DerivedSystem, unit: str, kind: _Kind) -> Iterator[dict[str, object]]:
-    """Yield the targets of a kind of simulations; the first simulator's target has the name without a suffix.
+def _simulation(system: DerivedSystem, kind: str, description: str, flag: str, replaced: Mapping[str, str]) -> _Kind:
+    """Return a kind of simulation; the first simulator's target has the name of the kind.
 
-    For simulators that do not read VHDL, the targets translate the design unit `unit` with all subunits.
+    `replaced` are parameters of both generators, and `flag` selects the simulated host in Verilog. Each kind but `sim`
+    is a product of the generator, whose simulator another program starts.
     """
-    sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
-    is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
-    known = fitting(has_verilog=_has_verilog(system), is_live=kind.is_live)
-    replaced = ", ".join(f"{name}: {value}" for name, value in kind.replaced.items())
-    for name, item in known.items():
-        is_first, is_default = item is next(iter(known.values())), name == default_simulator()
-        parameters = [f"product: {kind.product}"] * kind.is_live + [f"simulator: {name}"] * (not is_default)
-        parameters += [replaced] * bool(replaced)
-        # If the default simulator does not support the system, the first target is listed under both names.
-        anchor = (kind.name if kind.is_live else name) if is_first and not is_default else ""
-        yield {
-            "target": kind.name if is_first else f"{kind.name}_{name}",
-            "alias": {"name": f"{kind.name}_{name}", "anchor": anchor} if anchor else None,
-            "anchored": f" &{anchor}" if anchor else "",
-            "description": _description(item, kind, is_first=is_first),
-            "replaced": f": {{{replaced}}}" if replaced else "",
-            "parameters": f": {{{', '.join(parameters)}}}" if parameters else "",
-            "further_flag": "" if item.reads_vhdl else f", {kind.flag}: true",
-            "simulator": name,
-            "before": _options(item.system_verilog if is_system_verilog else {}),
-            "translated": None if item.reads_vhdl else {"unit": unit},
-            "options": _options(item.options),
-            "toplevel": f"{system.entity}_{kind.suffix}",
-        }
+    is_live = kind != "sim"
+    known, default = fitting(has_verilog=_has_verilog(system), is_live=is_live), default_simulator()
+    targets: list[_Target] = []
+    for name, simulator in known.items():
+        parameters = {"product": kind} if is_live else {}
+        parameters |= {"simulator": name} if name != default else {}
+        words = _generate(_call(_SYSTEM, replaced), _call(_SIMULATION, {**parameters, **replaced}))
+        toplevel = f"{system.entity}_{kind if is_live else 'tb'}"
+        flags = "" if simulator.reads_vhdl else flag
+        targets.append(_Target(f"{kind}_{name}" if targets else kind, words, toplevel, flags))
+    first = next(iter(known))
+    return _Kind(kind, description, targets, "" if first == default else f"{kind}_{first}")
+
+
+def _generate(*calls: str) -> list[str]:
+    """Return the entry that lists the uses of generators, in parts if it is longer than a line."""
+    whole = f"generate: [{', '.join(calls)}]"
+    if len(whole) < _COLUMNS - 4:
+        return [whole]
+    return [f"{'generate: [' * (call is calls[0])}{call}{']' * (call is calls[-1])}" for call in calls]
+
+
+def _call(instance: str, parameters: Mapping[str, str]) -> str:
+    """Return the use of a generator's instance with replaced parameters."""
+    listed = ", ".join(f"{name}: {value}" for name, value in parameters.items())
+    return f"{instance}: {{{listed}}}" if listed else instance
+
+
+def _emulation(system: DerivedSystem) -> _Kind:
+    """Return the target of `firm emulate`, which a system that cannot have a serial link does not have."""
+    has_netlist = not (system.clocks or system.kernels) and system.id_bytes == 1
+    simulation = _call(_SIMULATION, {"product": "live", "simulator": EMULATING, **EMULATED})
+    words = _generate(_call(_SYSTEM, EMULATED), simulation)
+    target = _Target("emulate", words, f"{system.entity}_live", "verilog_pipe")
+    text = "Build the hardware of firm emulate, behind the pins of a UART"
+    return _Kind("emulate", text, [target] if has_netlist and may_be_linked(system) else [])
+
+
+def _reports(system: DerivedSystem) -> Iterator[_Kind]:
+    """Yield the targets that count cells; kernels have no netlist before an HLS tool has generated them."""
+    if not system.kernels:
+        targets = [_Target(f"synth_{name}", [f"flow_options: {{family: {name}}}"], system.entity) for name in FAMILIES]
+        yield _Kind("synth", "Count the cells that Yosys makes for a family of FPGAs", targets)
+
+
+def _boards(system: DerivedSystem) -> _Kind:
+    """Return the targets of the boards that support the system's HLS kernels or network."""
+    known = {name: read_board(name) for name in boards()}
+    targets = [
+        _Target(
+            name,
+            _generate(_call(_SYSTEM, {"board": name})),
+            f"{board_entity(system, board)}{'_wrapper' * (board.flow == VIVADO)}",
+            board.ddr_flag or "",
+        )
+        for name, board in known.items()
+        if (board.flow == VIVADO or not system.kernels) and _has_network_of(system, board)
+    ]
+    # The others inherit from the first one, whose flags should be the common ones.
+    targets.sort(key=lambda target: target.flag)
+    return _Kind("board", "Build the bitstream, or a vendor's project, for the board of this name", targets)
 
 
 def _has_verilog(system: DerivedSystem) -> bool:
     return any(item.own.is_component for item in system.accelerator_types)
-
-
-def _emulation(system: DerivedSystem, unit: str) -> dict[str, object] | None:
-    """Return the target of `firm emulate`, or None for a system that cannot have a serial link."""
-    simulator = SIMULATORS[EMULATING]
-    has_netlist = not (system.clocks or system.kernels) and system.id_bytes == 1
-    if not (has_netlist and may_be_linked(system)):
-        return None
-    return {
-        **EMULATED,
-        "simulator": EMULATING,
-        "unit": unit,
-        "options": _options(simulator.options),
-        "toplevel": f"{system.entity}_live",
-    }
-
-
-def _description(simulator: Simulator, kind: _Kind, *, is_first: bool) -> str:
-    if kind.name == NETWORK and is_first:
-        return f"Build the simulated board of firm live in {simulator.title}, behind the pins of its network"
-    if kind.is_live and is_first:
-        return f"Build a simulator in {simulator.title} that another program starts and sends frames to"
-    if kind.is_live:
-        return f"The same in {simulator.title}"
-    if is_first:
-        netlist = "" if simulator.reads_vhdl else "; GHDL makes a netlist of the VHDL"
-        return f"Simulate with {simulator.title}, compare every byte with the model{netlist}"
-    return f"The same with {simulator.title}{simulator.remark}"
-
-
-def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
-    return [{"name": name, "value": value} for name, value in options.items()]
-
-
-def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """Return a board's target, or None if the board does not support the system's HLS kernels or network."""
-    board = read_board(name)
-    if (has_kernels and board.flow != VIVADO) or not _has_network_of(system, board):
-        return None
-    options: dict[str, str | Sequence[str] | None] = {
-        "frontends": ["ghdlsynth"] if board.is_linked else None,
-        "part": board.part,
-        "board_part": board.board_part,
-        # Only if Vivado manages the sources can a block design refer to modules by name.
-        "source_mgmt_mode": "All" if board.flow == VIVADO else None,
-        "yosys_synth_options": board.synth_options,
-        "nextpnr_options": board.nextpnr_options,
-        "device": board.device,
-        "family" if board.flow == QUARTUS else "device_family": board.device_family,
-    }
-    top = board_entity(system, board)
-    product = "Quartus project" if board.flow == QUARTUS else "Bitstream"
-    return {
-        "name": name,
-        "description": f"{product} for the board {board.description}",
-        # Edalize does not have a flow for Quartus.
-        "is_tool": board.flow == QUARTUS,
-        "flow": str(board.flow),
-        "further_flag": board.ddr_flag,
-        "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
-        "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
-    }
 
 
 def _has_network_of(system: DerivedSystem, board: Board) -> bool:
@@ -315,11 +322,16 @@ def _has_network_of(system: DerivedSystem, board: Board) -> bool:
     return kind in CHIPS if board.interconnect in CHIPS else board.interconnect in (kind, *LINKS, AXI_STREAM)
 
 
-def _value(value: str | Sequence[str]) -> str:
-    """Return a word or a list of words in YAML."""
-    return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
+def _mapping(values: Mapping[str, str | Sequence[str]]) -> str:
+    """Return the entries of a mapping in YAML on one line, without those that are empty."""
+    # In a mapping on one line, a comma ends a word, as in a list.
+    texts = {
+        name: yaml_list([value])[1:-1] if isinstance(value, str) else yaml_list(value)
+        for name, value in values.items()
+        if value
+    }
+    return ", ".join(f"{name}: {text}" for name, text in texts.items())
 
 
-def _paths(items: Sequence[str | Path]) -> str:
-    """Return a list on one line, or an empty string for an empty list."""
-    return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""
+def _paths(items: Sequence[str | Path]) -> list[str]:
+    return [str(PurePosixPath(item)) for item in items]
