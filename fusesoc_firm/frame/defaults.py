@@ -10,7 +10,7 @@ from typing import Any
 from fusesoc_firm.frame.decoder import decode
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node
-from fusesoc_firm.frame.values import CodecError, MessageValue, leaf_of, part_of, put, put_leaf
+from fusesoc_firm.frame.values import CodecError, MessageValue, leaf_of, part_of, put, put_leaf, without_arrays
 from fusesoc_firm.message.model import Scalar
 
 
@@ -60,8 +60,12 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def encode_answer(frame: Frame, message: MessageValue) -> bytes:
-    """Return the payload like `encode_used`, but missing fields are filled in as by `completed`."""
-    return encode_used(frame, completed(frame, message))
+    """Return the payload of a message that a user's code computed.
+
+    Missing fields are filled in as by `completed`, and sequences may be arrays of NumPy. Raise `CodecError` like
+    `encode`.
+    """
+    return encode_used(frame, completed(frame, without_arrays(message)))
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:

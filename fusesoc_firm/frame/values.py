@@ -12,6 +12,7 @@ from reprlib import Repr
 from typing import Any
 
 from fusesoc_firm.frame.model import Data, DataKind, Frame, FrameField, Loop, NameTree, Path
+from fusesoc_firm.text.diagnostics import closest
 
 MessageValue = Mapping[str, Any]
 BytesLike = bytes | bytearray | memoryview
@@ -120,7 +121,31 @@ def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> No
 def reject_unknown(frame: Frame, message: MessageValue) -> None:
     """Raise `CodecError` for an unknown name that contains values."""
     for names in _unknown(message, frame.names, ()):
-        raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
+        near = closest(*_first_unknown(names, frame.names))
+        meant = f"; did you mean '{near}'?" if near else ""
+        raise CodecError(f"{frame.message} has no field '{dotted(names)}'{meant}")
+
+
+def _first_unknown(names: tuple[str, ...], known: NameTree) -> tuple[str, NameTree]:
+    """Return the first name that is unknown, and the names that are known in its place."""
+    for name in names:
+        if name not in known:
+            return name, known
+        known = known[name]
+    return names[-1], {}
+
+
+def without_arrays(value: Any) -> Any:
+    """Return a message in which arrays and numbers of NumPy are lists and numbers of Python."""
+    if isinstance(value, Mapping):
+        return {name: without_arrays(inner) for name, inner in value.items()}
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    # Lists of numbers, such as an image's, may be long.
+    has_more = (
+        isinstance(value, list | tuple) and value and (isinstance(value[0], Mapping) or hasattr(value[0], "tolist"))
+    )
+    return [without_arrays(item) for item in value] if has_more else value
 
 
 def units_of(data: Data, text: object) -> BytesLike:

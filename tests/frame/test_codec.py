@@ -8,15 +8,18 @@ import struct
 from copy import deepcopy
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fusesoc_firm.frame.codec import CodecError, decode, encode, pack_frame, used_bytes
+from fusesoc_firm.frame.defaults import encode_answer
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from tests.frame.test_layout import layout
 
 INNER = {"p/E": "bool flag\nint16 number\n"}
 GOOD: dict[str, Any] = {"e": [{"flag": True, "number": -2}, {"flag": False, "number": 3}], "f": [0.5, 2.0], "u": 7}
+NUMBERS = "p/M has no field 'e.numbers'; did you mean 'number'?"
 
 
 @pytest.fixture
@@ -49,12 +52,30 @@ def test_bytes_by_hand(frame: Frame) -> None:
         ({"u": None}, "'u' must be of type uint8, not None"),
         ({"u": {"v": 1}}, "'u' must be of type uint8, not {'v': 1}"),
         ({"g": 1}, "p/M has no field 'g'"),
+        ({"E": [{"x": 1}]}, "p/M has no field 'E.x'; did you mean 'e'?"),
+        ({"e": [{"flag": True, "number": 1, "numbers": 1}, GOOD["e"][1]]}, NUMBERS),
     ],
 )
 def test_values_that_do_not_fit(frame: Frame, change: dict[str, Any], message: str) -> None:
     with pytest.raises(CodecError) as caught:
         encode(frame, {**GOOD, **change})
     assert str(caught.value) == message
+
+
+def test_an_answer_may_have_arrays_of_numpy(frame: Frame) -> None:
+    """Scalars, arrays and lists of them, and missing fields."""
+    answer: dict[str, Any] = {
+        "e": [{"flag": np.bool_(True), "number": np.int16(-2)}, {"number": 3}],
+        "f": np.array([0.5, 2.0], dtype=np.float32),
+        "u": np.uint8(7),
+    }
+    assert encode_answer(frame, answer) == encode(frame, GOOD)
+    parts = layout(ROS2, "float64[] f\nuint8[] d\nE[] e\n", INNER)
+    sent = {"f": np.arange(3) * 0.5, "d": np.arange(300, dtype=np.uint8)[:200], "e": (answer["e"][0],)}
+    plain = {"f": [0.0, 0.5, 1.0], "d": [*range(200)], "e": GOOD["e"][:1]}
+    assert encode_answer(parts, sent) == encode(parts, plain)
+    with pytest.raises(CodecError, match=r"^'f' must be of type float64, not \[0.0\]"):
+        encode_answer(parts, {"f": np.zeros((2, 1))})
 
 
 def test_a_missing_field_is_named(frame: Frame) -> None:
