@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,13 @@ _COPY = re.compile(r"(?<!\S)src/[^/\s]+/(?P<path>[^\s:]+):(?P<line>\d+)\b")
 
 
 def print_errors(build: Build, folder: Path | None, loaded: LoadedSystem | None) -> None:
-    """Print the lines of the log from the first error on, or its last lines.
+    """Print `error_lines` on standard error."""
+    for line in error_lines(build, folder, loaded):
+        print(line, file=sys.stderr)
+
+
+def error_lines(build: Build, folder: Path | None, loaded: LoadedSystem | None) -> Iterator[str]:
+    """Yield the lines of the log from the first error on, or its last lines.
 
     Copies are named after their originals. A line of a generated file is followed by its line of the specification.
     """
@@ -35,12 +42,9 @@ def print_errors(build: Build, folder: Path | None, loaded: LoadedSystem | None)
     for line in (text.removeprefix(here) for text in lines[first : first + _MOST_LINES]):
         place = _COPY.search(line)
         original = _original(place, build.work_root, folder) if place else None
-        named = (
-            f"{line[: place.start()]}{original}:{place['line']}{line[place.end() :]}" if place and original else line
-        )
-        print(named, file=sys.stderr)
+        yield f"{line[: place.start()]}{original}:{place['line']}{line[place.end() :]}" if place and original else line
         if place and not original and loaded and (source := _origin(place, build.work_root, loaded)):
-            print(f"      = this generated line belongs to {source}", file=sys.stderr)
+            yield f"      = this generated line belongs to {source}"
 
 
 def _original(copy: re.Match[str], work_root: Path, folder: Path | None) -> Path | None:

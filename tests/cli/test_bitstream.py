@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +21,15 @@ REPORT = {
     "fmax": {"clk": {"achieved": 63.04, "constraint": 25}},
     "utilization": {"TRELLIS_COMB": {"used": 700, "available": 83640}, "DP16KD": {"used": 0, "available": 208}},
 }
+# The lines with which the makefile starts its programs; they are preceded by FuseSoC's, and followed by theirs.
+LINES = [
+    "INFO: Generating",
+    "/usr/bin/python3 -m fusesoc_firm.cli tool /usr/bin/python3 -m fusesoc_firm.netlist tilt.ghdlsynth",
+    "/usr/bin/python3 -m fusesoc_firm.cli tool yosys -l yosys.log",
+    "2. Executing SYNTH_ECP5 pass.",
+    "/usr/bin/python3 -m fusesoc_firm.cli tool nextpnr-ecp5 -l next.log",
+    "/usr/bin/python3 -m fusesoc_firm.cli tool ecppack tilt.config",
+]
 
 
 @pytest.fixture(autouse=True)
@@ -36,11 +47,13 @@ def tools(monkeypatch: pytest.MonkeyPatch) -> None:
         BITSTREAM.parent.mkdir(parents=True)
         BITSTREAM.touch()
         BITSTREAM.with_name("report.json").write_text(json.dumps(REPORT))
-        tell("Info: done")
-        return 0
+        build.log.write_text("\n".join([*LINES, "ERROR: no place"]))
+        for line in LINES:
+            tell(line)
+        return build.log.with_suffix(".status").exists()
 
     monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.missing", lambda _: [])
-    monkeypatch.setattr("fusesoc_firm.builds.setup.logged_run.run_logged", run)
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.run_logged", run)
 
 
 def error(capsys: Captured, *words: str) -> str:
@@ -62,6 +75,53 @@ def test_a_bitstream_is_reported_with_clock_area_and_the_next_step(capsys: Captu
     ]
 
 
+def lines_of_json(capsys: Captured, status: int, *words: str) -> list[dict[str, Any]]:
+    with pytest.raises(SystemExit, match=f"^{status}$") if status else nullcontext():
+        assert main([*words, "--json"]) == 0
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+@pytest.mark.usefixtures("tools")
+def test_steps_and_result_are_lines_of_json(capsys: Captured) -> None:
+    *steps, end = lines_of_json(capsys, 0, "bitstream", "--board", "ulx3s")
+    assert {(step["number"], step["step"]) for step in steps} == {
+        (1, "check"),
+        (2, "generated files"),
+        (3, "netlist"),
+        (4, "synthesis"),
+        (5, "place and route"),
+        (6, "bitstream"),
+    }
+    assert [step["number"] for step in steps] == sorted(step["number"] for step in steps)
+    assert {step["count"] for step in steps} == {6}
+    assert {step["line"] for step in steps if step["number"] == 4} == {*LINES[2:4]}
+    assert end == {
+        "state": "done",
+        "bitstream": str(BITSTREAM),
+        "log": "build/robot_sys_tilt_0.1.0/ulx3s.log",
+        "clocks": [{"name": "clk", "reached": 63.04, "needed": 25}],
+        "area": [{"name": "TRELLIS_COMB", "used": 700, "available": 83640}],
+        "next": "firm load --board ulx3s",
+    }
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_failure_is_a_line_of_json(capsys: Captured) -> None:
+    (end,) = lines_of_json(capsys, 1, "load", "--board", "ulx3s")
+    hint = "build it: firm bitstream --board ulx3s"
+    fault = {"severity": "error", "message": "there is no bitstream for ulx3s", "hint": hint}
+    assert end == {"state": "failed", "faults": [fault]}
+    BITSTREAM.parent.parent.mkdir(parents=True)
+    BITSTREAM.parent.with_name("ulx3s.status").touch()
+    end = lines_of_json(capsys, 1, "bitstream", "--board", "ulx3s")[-1]
+    assert (end["state"], end["output"]) == ("failed", ["ERROR: no place"])
+    assert end["clocks"] == [{"name": "clk", "reached": 63.04, "needed": 25}]
+    assert end["faults"][0]["hint"] == "the whole output: build/robot_sys_tilt_0.1.0/ulx3s.log"
+    Path("tilt.yaml").write_text(Path("tilt.yaml").read_text().replace("project:\n", "project:\n  widht: 8\n"))
+    fault = lines_of_json(capsys, 1, "bitstream", "--board", "ulx3s")[-1]["faults"][0]
+    assert (fault["file"], fault["line"], fault["message"]) == ("tilt.yaml", 3, "'project' has no key 'widht'")
+
+
 @pytest.mark.usefixtures("tools")
 def test_a_bitstream_is_loaded(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     programs = tmp_path / "bin"
@@ -79,6 +139,10 @@ def test_a_bitstream_is_loaded(capsys: Captured, tmp_path: Path, monkeypatch: py
     assert main(["program", "tilt.yaml"]) == 0
     assert Path("words").read_text() == f"-b ulx3s {BITSTREAM}\n"
     assert capsys.readouterr().out == "next: firm live tilt.yaml --transport uart:/dev/ttyUSB1:1000000\n"
+    loader.write_text("#!/bin/sh\nprintf '10 %%\\r100 %%\\n'\n")
+    *steps, end = lines_of_json(capsys, 0, "load")
+    assert [step["line"] for step in steps] == ["10 %", "100 %"]
+    assert end == {"state": "done", "next": "firm live tilt.yaml --transport uart:/dev/ttyUSB1:1000000"}
     loader.write_text("#!/bin/sh\nexit 3\n")
     assert f"openFPGALoader -b ulx3s {BITSTREAM} ended with status 3" in error(capsys, "load")
 

@@ -3,36 +3,94 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.builds.setup.flows import target_flow
-from fusesoc_firm.builds.setup.logged_run import add_libraries
+from fusesoc_firm.builds.setup.logged_run import add_libraries, run_logged
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.builds.setup.plan import make_plan
-from fusesoc_firm.system.boards.board import boards
+from fusesoc_firm.core.core_reader import read_core
+from fusesoc_firm.system.boards.board import Board, boards
+from fusesoc_firm.system.scaffold.board_targets import boards_of
 from fusesoc_firm.text.diagnostics import closest, fail
 from fusesoc_firm.tools.programs import missing, ways
 
-_NETLIST = ("ghdl", "yosys")
+CHECK = "check"
+_SETUP = "generated files"
+_NETLIST = {"ghdl": "netlist", "yosys": "synthesis"}
+_LAYOUT, _PACKING = "place and route", "bitstream"
 _REPORT = "report.json"
+# The line with which a makefile starts a program of a build; Python is the netlist's program.
+_START = re.compile(r"-m fusesoc_firm\.cli tool (?:\S*/)?(?P<program>\S+)(?P<netlist> -m fusesoc_firm\.netlist )?")
 
 
 @dataclass(frozen=True)
 class _Flow:
-    """A flow of Edalize that ends in a bitstream: the file's extension and the programs; open ones are an extra."""
+    """A flow of Edalize that ends in a bitstream: the file's extension, and the step of each program in their order."""
 
     extension: str
-    programs: tuple[str, ...]
+    programs: Mapping[str, str]
 
 
 _FLOWS = {
-    "apicula": _Flow(".fs", (*_NETLIST, "nextpnr-himbaechel", "gowin_pack")),
-    "icestorm": _Flow(".bin", (*_NETLIST, "nextpnr-ice40", "icepack")),
-    "trellis": _Flow(".bit", (*_NETLIST, "nextpnr-ecp5", "ecppack")),
-    "vivado": _Flow(".bit", ("vivado",)),
+    "apicula": _Flow(".fs", {**_NETLIST, "nextpnr-himbaechel": _LAYOUT, "gowin_pack": _PACKING}),
+    "icestorm": _Flow(".bin", {**_NETLIST, "nextpnr-ice40": _LAYOUT, "icepack": _PACKING}),
+    "trellis": _Flow(".bit", {**_NETLIST, "nextpnr-ecp5": _LAYOUT, "ecppack": _PACKING}),
+    "vivado": _Flow(".bit", {"vivado": _PACKING}),
 }
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of a build: its number, counted from 1, of `count`; `line` is the last line of its program's output."""
+
+    step: str
+    number: int
+    count: int
+    line: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.step} ({self.number} of {self.count}){f': {self.line}' if self.line else ''}"
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock of a placed system: the frequency that it reaches and the one that the board needs, in MHz."""
+
+    name: str
+    reached: float
+    needed: float
+
+
+@dataclass(frozen=True)
+class Use:
+    """The cells of a kind that a placed system uses, of those that the FPGA has."""
+
+    name: str
+    used: int
+    available: int
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What nextpnr reports about a placed system; both are empty without a report."""
+
+    clocks: tuple[Clock, ...] = ()
+    area: tuple[Use, ...] = ()
+
+    def lines(self) -> list[str]:
+        """Return the figures as lines of a report."""
+        found = [f"clock:     {item.reached:.1f} MHz reached, {item.needed:.1f} MHz needed" for item in self.clocks]
+        area = ", ".join(f"{item.name} {item.used} of {item.available}" for item in self.area)
+        return found + [f"area:      {area}"] * bool(area)
+
+    def data(self) -> dict[str, Any]:
+        """Return the figures as plain data."""
+        return {"clocks": [*map(asdict, self.clocks)], "area": [*map(asdict, self.area)]}
 
 
 @dataclass(frozen=True)
@@ -49,6 +107,11 @@ class BoardBuild:
         return self.build.target
 
     @property
+    def board_file(self) -> Board:
+        """The content of the board's file. May raise `InputError`."""
+        return boards_of(read_core(self.core_file))[self.board]
+
+    @property
     def bitstream(self) -> Path | None:
         """The bitstream, or None if it is not built."""
         name = self.build.core.replace(":", "_")
@@ -57,24 +120,47 @@ class BoardBuild:
 
     def check_programs(self) -> None:
         """Raise `InputError` if a program of the build is not installed."""
-        if absent := missing(_FLOWS[self.flow].programs):
-            extra = f"; all of Python: pip install 'fusesoc-firm[{self.flow}]'" if self.flow != "vivado" else ""
-            hint = "; ".join(f"{program}: {ways(program)}" for program in absent)
-            fail(f"missing programs: {', '.join(absent)}", hint=hint + extra)
+        if absent := missing(programs_of(self.flow)):
+            fail(f"missing programs: {', '.join(absent)}", hint=remedy(self.flow, absent))
 
-    def figures(self) -> list[str]:
-        """Return lines about the clocks and the area that nextpnr reports; without a report, an empty list."""
+    def step(self, name: str, line: str = "") -> Step:
+        """Return a step of this build."""
+        names = (CHECK, _SETUP, *_FLOWS[self.flow].programs.values())
+        return Step(name, names.index(name) + 1, len(names), line)
+
+    def run(self, tell: Callable[[Step], None]) -> int:
+        """Build, call `tell` for each line of the programs, and return FuseSoC's exit status."""
+        steps, name = _FLOWS[self.flow].programs, _SETUP
+
+        def take(line: str) -> None:
+            nonlocal name
+            if start := _START.search(line):
+                name = steps.get("ghdl" if start["netlist"] else start["program"], name)
+            tell(self.step(name, line))
+
+        tell(self.step(_SETUP))
+        return run_logged(self.build, ("--setup", "--build"), (), take)
+
+    def figures(self) -> Figures:
+        """Return what nextpnr reports about the clocks and the area."""
         path = self.build.work_root / _REPORT
         if not path.is_file():
-            return []
+            return Figures()
         report = json.loads(path.read_text(encoding="utf-8"))
-        clocks = [
-            f"{clock['achieved']:.1f} MHz reached, {clock['constraint']:.1f} MHz needed"
-            for clock in report["fmax"].values()
-        ]
-        used = {name: item for name, item in report["utilization"].items() if item["used"]}
-        area = [f"{name} {item['used']} of {item['available']}" for name, item in used.items()]
-        return [*(f"clock:     {line}" for line in clocks), f"area:      {', '.join(area)}"]
+        clocks = [Clock(name, item["achieved"], item["constraint"]) for name, item in report["fmax"].items()]
+        area = [Use(name, **item) for name, item in report["utilization"].items() if item["used"]]
+        return Figures(tuple(clocks), tuple(area))
+
+
+def programs_of(flow: str) -> Sequence[str]:
+    """Return the programs of a flow that ends in a bitstream; none for other flows."""
+    return [*_FLOWS[flow].programs] if flow in _FLOWS else []
+
+
+def remedy(flow: str, absent: Sequence[str]) -> str:
+    """Return the commands that install missing programs of a flow."""
+    extra = f"; all of Python: pip install 'fusesoc-firm[{flow}]'" if flow != "vivado" else ""
+    return "; ".join(f"{program}: {ways(program)}" for program in absent) + extra
 
 
 def board_builds(core: str, folder: Path | None) -> list[BoardBuild]:

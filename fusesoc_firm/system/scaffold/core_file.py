@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.core.core_reader import read_core
-from fusesoc_firm.system.boards.board import VIVADO, Board, board_entity, boards, read_board
+from fusesoc_firm.system.boards.board import VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived.link import may_be_linked
 from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.scaffold.board_targets import has_target
 from fusesoc_firm.system.system_core import LoadedSystem
-from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, LINKS
+from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list
@@ -305,7 +306,7 @@ def _boards(system: DerivedSystem) -> _Kind:
             board.ddr_flag or "",
         )
         for name, board in known.items()
-        if (board.flow == VIVADO or not system.kernels) and _has_network_of(system, board)
+        if has_target(system, board)
     ]
     # The others inherit from the first one, whose flags should be the common ones.
     targets.sort(key=lambda target: target.flag)
@@ -314,12 +315,6 @@ def _boards(system: DerivedSystem) -> _Kind:
 
 def _has_verilog(system: DerivedSystem) -> bool:
     return any(item.own.is_component for item in system.accelerator_types)
-
-
-def _has_network_of(system: DerivedSystem, board: Board) -> bool:
-    """Return whether a system is the kind of node that a board's interconnect requires."""
-    kind = system.network.kind.value if system.network else ""
-    return kind in CHIPS if board.interconnect in CHIPS else board.interconnect in (kind, *LINKS, AXI_STREAM)
 
 
 def _mapping(values: Mapping[str, str | Sequence[str]]) -> str:
