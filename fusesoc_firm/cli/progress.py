@@ -35,6 +35,13 @@ class Progress:
         """Name the current step."""
         self._step = step
 
+    def say(self, text: str) -> None:
+        """Print a text above the progress, whose step is its first line from now on."""
+        if self._is_shown and self._is_terminal:
+            print_step("")
+        print(text, file=sys.stderr, flush=True)
+        self.step(text.partition("\n")[0])
+
     def __enter__(self) -> Self:
         """Begin to show the progress."""
         if self._is_shown:

@@ -7,11 +7,12 @@ import signal
 import sys
 import webbrowser
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from fusesoc_firm.cli.common import add_sources, check_sources, command, core_folders
+from fusesoc_firm.cli.progress import Progress
 from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
@@ -109,28 +110,31 @@ def _serve_beside(studio: Studio, begins: threading.Event, ends: threading.Event
 
 
 def _open(arguments: argparse.Namespace) -> None:
-    _require_aiohttp()
     import asyncio
 
-    if not arguments.place.exists():
-        fail(f"there is no file or folder {arguments.place}")
-    from fusesoc_firm.studio.page_files import build_page
+    with ExitStack() as start:
+        progress = start.enter_context(Progress("starting the page's server"))
+        _require_aiohttp()
+        if not arguments.place.exists():
+            fail(f"there is no file or folder {arguments.place}")
+        from fusesoc_firm.studio.page_files import build_page
 
-    build_page(lambda text: print(text, file=sys.stderr, flush=True))
-    studio = _studio(arguments, arguments.place)
+        build_page(progress.say)
+        studio = _studio(arguments, arguments.place)
 
-    async def serve() -> None:
-        try:
-            runner = await studio.start(arguments.port)
-        except OSError as error:
-            fail(f"port {arguments.port} cannot be used: {error.strerror}")
-        _show(studio, arguments, sys.stdout)
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await runner.cleanup()
+        async def serve() -> None:
+            try:
+                runner = await studio.start(arguments.port)
+            except OSError as error:
+                fail(f"port {arguments.port} cannot be used: {error.strerror}")
+            start.close()
+            _show(studio, arguments, sys.stdout)
+            try:
+                await asyncio.Event().wait()
+            finally:
+                await runner.cleanup()
 
-    asyncio.run(serve())
+        asyncio.run(serve())
 
 
 def _require_aiohttp() -> None:

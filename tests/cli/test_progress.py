@@ -43,6 +43,20 @@ def test_on_a_terminal_one_line_is_updated_and_removed(capsys: Captured, monkeyp
     assert text.endswith("building\r\033[K")
 
 
+def test_a_text_is_above_the_line(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with Progress("starting") as steps:
+        while "starting" not in capsys.readouterr().err:
+            time.sleep(0.01)
+        steps.say("no page:\nit is missing")
+        text = ""
+        while "[" not in text.rpartition("missing\n")[2]:
+            time.sleep(0.01)
+            text += capsys.readouterr().err
+    assert "\r\033[Kno page:\nit is missing\n" in text
+    assert text.rpartition("missing\n")[2].startswith("\r\033[K[0 s] no page:")
+
+
 def test_a_quiet_command_and_a_program_that_compares_see_nothing(
     capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
