@@ -84,7 +84,12 @@ class Editing:
 
     def _source_faults(self, document: Document) -> list[dict[str, Any]]:
         try:
-            diagnostics = self._workspace.tools.check(self._workspace.loaded(document), document.path)
+            loaded = self._workspace.loaded(document)
+        except InputError:
+            # The scene reports these faults.
+            return []
+        try:
+            diagnostics = self._workspace.tools.check(loaded, document.path)
         except InputError as error:
             diagnostics = error.shown()
         return [item.data() for item in diagnostics]

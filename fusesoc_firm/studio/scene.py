@@ -5,7 +5,7 @@ The picture needs only a text that is YAML; the rest of the specification may be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from itertools import pairwise
@@ -30,7 +30,7 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
 
     `specification` is the file's content (None if it is not a mapping in YAML), `lines` are the first and the last line
     of each block, `faults` are its faults and warnings, each with the `path` of its item, and `derived` is what
-    `firm system show` prints (None if there are faults).
+    `firm system show` prints (None if there are faults, or no blocks yet).
     """
     derived = None
     diagnostics: Iterable[Diagnostic]
@@ -42,8 +42,9 @@ def scene(text: str, file: str, load: Load) -> dict[str, Any]:
         diagnostics = error.shown()
     read = _read(text)
     root = read.root if read else None
-    faults = [_fault(root, file, item) for item in diagnostics]
-    return _written(read) | {"faults": faults, "derived": derived}
+    written = _written(read)
+    faults = [_fault(root, file, item) for item in diagnostics if not _is_of_empty(written["specification"], item)]
+    return written | {"faults": faults, "derived": derived}
 
 
 def outline(text: str) -> dict[str, Any]:
@@ -96,6 +97,11 @@ def _read(text: str) -> YamlText | None:
     with suppress(InputError):
         return parse_yaml(text, "", Diagnostics())
     return None
+
+
+def _is_of_empty(content: Mapping[str, Any] | None, fault: Diagnostic) -> bool:
+    """Return whether a fault says only that a system has no blocks yet."""
+    return content is not None and content.get("blocks") in (None, []) and "'blocks'" in fault.message
 
 
 def _fault(root: yaml.Node | None, file: str, fault: Diagnostic) -> dict[str, Any]:

@@ -45,7 +45,9 @@ def test_faults_lead_to_their_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
             return load_system(Draft(Path(name), text), libraries)
 
         found = scene(text, path.name, load)
-        assert any(fault["severity"] == "error" for fault in found["faults"]), path
+        # A system that has no blocks yet is not wrong yet.
+        is_empty = path.stem == "no_blocks"
+        assert any(fault["severity"] == "error" for fault in found["faults"]) != is_empty, path
         if found["specification"] is None:
             continue
         for fault in found["faults"]:
@@ -60,6 +62,23 @@ def test_faults_lead_to_their_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
                 assert fault["path"][:2] == ["blocks", block], (path, fault)
                 seen += 1
     assert seen > 100
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("project: {name: a}\n", 0),
+        ("project: {name: a}\nblocks: []\n", 0),
+        ("project: {name: a}\nblocks:\n", 0),
+        ("project: {name: a, widht: 8}\nblocks: []\n", 1),
+        ("project: {name: a}\nblocks: {}\n", 1),
+        ("blocks: []\n", 1),
+    ],
+)
+def test_an_empty_system_is_not_wrong_yet(text: str, count: int) -> None:
+    libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
+    found = scene(text, "a.yaml", lambda text: load_system(Draft(Path("a.yaml"), text), libraries))
+    assert (len(found["faults"]), found["derived"]) == (count, None)
 
 
 @pytest.mark.parametrize(

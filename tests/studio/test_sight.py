@@ -33,6 +33,16 @@ IN_VIEW = """(() => {
   return node.left >= pane.left && node.right <= pane.right && node.top >= pane.top && node.bottom <= pane.bottom;
 })()"""
 
+# What is drawn in the colour of faults.
+RED = """(() => {
+  const probe = document.body.appendChild(Object.assign(document.createElement("i"), { className: "bad" }));
+  const { color } = getComputedStyle(probe);
+  probe.remove();
+  const keys = ["color", "borderTopColor", "backgroundColor"];
+  const isRed = (item) => item.checkVisibility() && keys.some((key) => getComputedStyle(item)[key] === color);
+  return [...document.querySelectorAll("body *")].filter(isRed).map((item) => item.outerHTML);
+})()"""
+
 
 def system(chains: int, more: str = "") -> str:
     """The text of a system with a subscriber, an accelerator and a publisher in each chain."""
@@ -108,6 +118,7 @@ def test_a_system_is_readable(robot: Path, tmp_path: Path, name: str, size: tupl
         if name != "empty":
             await page.until(IN_VIEW)
         await measure(page)
+        assert await page.evaluate(RED) == []
 
     seen(robot, tmp_path, size, steps)
 
@@ -133,8 +144,7 @@ def test_a_run_is_readable(tmp_path: Path, size: tuple[int, int]) -> None:
         await page.until(f"{ROWS}.length > 5")
         await page.until("document.querySelectorAll('.block .value.known').length >= 4")
         await measure(page)
-        red = "[...document.querySelectorAll('body *')].filter(item => item.checkVisibility() && item.matches('.bad'))"
-        assert await page.evaluate(f"{red}.map(item => item.outerHTML)") == []
+        assert await page.evaluate(RED) == []
 
     seen(write_system(tmp_path), tmp_path, size, steps)
 
