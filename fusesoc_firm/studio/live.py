@@ -7,7 +7,7 @@ slow the run. A slow page receives fewer reports; the run never waits for it.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -20,7 +20,7 @@ from fusesoc_firm.node.transport.built_simulator import MOST_SEED, MOST_STALL_PE
 from fusesoc_firm.studio.foxglove import FOXGLOVE, PROTOCOLS, serve_foxglove
 from fusesoc_firm.studio.message import fields_of, has_picture, has_pose, numbers_of, picture_of, pose_of
 from fusesoc_firm.studio.page_run import Run, SimulatedRun, Wishes
-from fusesoc_firm.studio.reports import Reports, row
+from fusesoc_firm.studio.reports import Jobs, Reports, row
 from fusesoc_firm.studio.requests import Requests, body_of, in_json, number_of
 from fusesoc_firm.studio.units import unit_of
 from fusesoc_firm.studio.workspace import Workspace
@@ -48,9 +48,9 @@ _CONTROLS = ("pause", "resume", "step", "stop")
 class Live:
     """The current run, and the requests about it."""
 
-    def __init__(self, workspace: Workspace) -> None:
-        """Begin without a run."""
-        self._workspace = workspace
+    def __init__(self, workspace: Workspace, jobs: Callable[[], Jobs]) -> None:
+        """Begin without a run; `jobs` returns the states of the builds."""
+        self._workspace, self._jobs = workspace, jobs
         self._count = 0
         self._sockets: set[web.WebSocketResponse] = set()
         self._pages = 0
@@ -131,7 +131,7 @@ class Live:
         reports, now = Reports(), asyncio.get_running_loop().time
         while True:
             await ahead.acquire()
-            while (report := reports.next(self.run, self._count, self._file)) is None:
+            while (report := reports.next(self.run, self._count, self._file, self._jobs())) is None:
                 await asyncio.sleep(_SECONDS)
             await socket.send_json(report, dumps=json_text)
             # Sleep until the next multiple of the period, so that delays do not accumulate.

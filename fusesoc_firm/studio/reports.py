@@ -21,6 +21,9 @@ _MOST_NEW = 20
 # The time between two figures of a run, which is limited because figures sort all latencies.
 _FIGURE_SECONDS = 0.5
 
+Jobs = Mapping[str, Mapping[str, Any]]
+"""The states of the latest builds for boards, by kind."""
+
 
 class Reports:
     """The reports to one page; the first one is complete."""
@@ -32,12 +35,13 @@ class Reports:
         self._last, self._reported = -1, -inf
         self._is_stale = False
         self._loads: Mapping[str, Any] = {}
+        self._jobs: Jobs = {}
 
-    def next(self, run: Run | None, number: int, file: str) -> dict[str, Any] | None:
-        """Return the changes of the run with this number, of a file; None without changes.
+    def next(self, run: Run | None, number: int, file: str, jobs: Jobs) -> dict[str, Any] | None:
+        """Return the changes of the builds, and of the run with this number, of a file; None without changes.
 
         `run` is the state of the run, which is None without a run; `messages` are the newest messages, after `skipped`
-        others; `figures` are counts and loads of all blocks. A report omits unchanged items.
+        others; `figures` are counts and loads of all blocks; `jobs` are all builds. A report omits unchanged items.
         """
         state = state_of(run, number, file) if run else None
         report: dict[str, Any] = {}
@@ -46,6 +50,8 @@ class Reports:
             if state is None or self._state is None or state["number"] != self._state["number"]:
                 self._last = -1
             self._is_first, self._state = False, state
+        if jobs != self._jobs:
+            report["jobs"] = self._jobs = jobs
         if run:
             self._add_messages(run, report)
             self._add_figures(run, report)

@@ -13,7 +13,6 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import sys
 import tempfile
 from collections import Counter
@@ -25,6 +24,7 @@ from typing import Any
 
 from fusesoc_firm.core.core_reader import CoreFile
 from fusesoc_firm.node.transport.built_simulator import fusesoc_run, project_folder
+from fusesoc_firm.studio.processes import run
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.files import write_whole
@@ -200,25 +200,9 @@ def _yosys() -> Path:
 
 async def _run(command: Sequence[str], folder: Path) -> None:
     """Run a program to its end, and end it if the call is cancelled. Raise `InputError` if it fails."""
-    process = await asyncio.create_subprocess_exec(
-        *command,
-        cwd=folder,
-        # The launcher of our own builds would answer the steps from its cache.
-        env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-        start_new_session=True,
-    )
-    try:
-        printed = (await process.communicate())[0].decode(errors="replace")
-    finally:
-        if process.returncode is None:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            await process.wait()
-    if process.returncode:
-        lines = [line for line in printed.splitlines() if not line.startswith("INFO:")]
+    printed: list[str] = []
+    if await run(command, folder, printed.append):
+        lines = [line for line in printed if not line.startswith("INFO:")]
         fail(f"{shlex.join(command[:3])} failed:\n" + "\n".join(lines[-_SHOWN_LINES:]))
 
 

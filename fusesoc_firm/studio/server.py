@@ -13,6 +13,7 @@ from pathlib import Path
 from aiohttp import web
 
 from fusesoc_firm.studio.begin import Begin
+from fusesoc_firm.studio.boards import Boards
 from fusesoc_firm.studio.editing import Editing
 from fusesoc_firm.studio.evaluation import Evaluation
 from fusesoc_firm.studio.foxglove import FOXGLOVE
@@ -46,8 +47,10 @@ class Studio:
     def __init__(self, place: Path, tools: Tools) -> None:
         """Serve a file or folder with the tools of the command line."""
         workspace = Workspace(place, tools)
-        self._editing, self._evaluation, self.live = Editing(workspace), Evaluation(workspace), Live(workspace)
-        self._parts = (self._editing, self.live, Views(workspace), self._evaluation, Begin(workspace))
+        self._editing, self._evaluation, self._boards = Editing(workspace), Evaluation(workspace), Boards(workspace)
+        self.live = Live(workspace, lambda: self._boards.jobs)
+        views, begin = Views(workspace), Begin(workspace)
+        self._parts = (self._editing, self.live, views, self._evaluation, self._boards, begin)
         self._own_hosts: set[str] = set()
         self.secret = secrets.token_urlsafe(24)
 
@@ -62,7 +65,7 @@ class Studio:
         if (PAGE / "assets").is_dir():
             app.router.add_static(f"{under}/assets", PAGE / "assets")
         app.cleanup_ctx.append(self._editing.following)
-        app.on_shutdown.extend([lambda _: self.live.close(), lambda _: self._evaluation.close()])
+        app.on_shutdown.append(self._close)
         runner = web.AppRunner(app, access_log=None)
         await runner.setup()
         site = web.TCPSite(runner, HOST, port)
@@ -72,6 +75,11 @@ class Studio:
         self.address = f"http://{HOST}:{number}{under}/"
         self.foxglove = f"ws://{HOST}:{number}{under}/api/{FOXGLOVE}"
         return runner
+
+    async def _close(self, _: web.Application) -> None:
+        """End everything that the page has started."""
+        for part in (self.live, self._evaluation, self._boards):
+            await part.close()
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:

@@ -212,13 +212,13 @@ def test_a_load_that_changes_without_a_message_is_reported(spec: Path, monkeypat
     run.control.pause()
     reports, loads = Reports(), {"point": Load(1, 100, 0, 0, 0)}
     run.watch.measure(lambda: loads)
-    assert reports.next(run, 1, "robot.yaml")
-    assert reports.next(run, 1, "robot.yaml") is None
+    assert reports.next(run, 1, "robot.yaml", {})
+    assert reports.next(run, 1, "robot.yaml", {}) is None
     loads["point"] = Load(0, 100, 0, 1, 0)
-    report = reports.next(run, 1, "robot.yaml")
+    report = reports.next(run, 1, "robot.yaml", {})
     assert report
     assert report["figures"]["loads"]["point"]["refused"] == 1
-    assert reports.next(run, 1, "robot.yaml") is None
+    assert reports.next(run, 1, "robot.yaml", {}) is None
 
 
 def test_waits_are_counted_only_while_a_page_watches(studio: Studio) -> None:

@@ -173,11 +173,11 @@ FILES = [
 def test_no_other_file_is_read_or_written(studio: Studio, folder: Path, name: str) -> None:
     hidden = folder.parent / "secret.yaml"
     before = hidden.read_bytes()
-    for path in "scene", "messages", "sources", "bytes", "generated", "schedulers", "resources":
+    for path in "scene", "messages", "sources", "bytes", "generated", "schedulers", "resources", "boards":
         status, _, text = ask(studio, "GET", f"api/{path}?file={quote(name, safe='')}")
         assert status == 404
         assert "hidden" not in str(text)
-    for path in "edit", "write", "undo", "redo", "check":
+    for path in "edit", "write", "undo", "redo", "check", "run", "bitstream", "load":
         status, _, text = ask(studio, "POST", f"api/{path}", {"file": name, "version": "", "text": "x"})
         assert status == 404, path
     assert hidden.read_bytes() == before
@@ -208,12 +208,20 @@ HEADERS = [
         "api/changes",
         "api/watch",
         "api/resources?file=arm/arm.yaml",
+        "api/boards?file=arm/arm.yaml",
         "assets/index.js",
     ],
 )
 def test_other_pages_are_refused(studio: Studio, headers: dict[str, str], path: str) -> None:
     status, _, text = ask(studio, "GET", path, None, **headers)
     assert (status, text) == (403, "open the address that firm studio printed\n")
+
+
+@pytest.mark.parametrize("headers", HEADERS, ids=str)
+@pytest.mark.parametrize("path", ["edit", "run", "bitstream", "load", "cancel"])
+def test_other_pages_begin_nothing(studio: Studio, headers: dict[str, str], path: str) -> None:
+    body = {"file": "arm/arm.yaml", "board": "icebreaker"}
+    assert ask(studio, "POST", f"api/{path}", body, **headers)[0] == 403
 
 
 @pytest.mark.parametrize("secret", ["", "x", "é", "..", "../..", "%2e%2e", "a" * 32, "null"])

@@ -118,6 +118,49 @@ export const types = (ros: number, query: string) => get<{ messages: string[] }>
 /** Write a new project. */
 export const init = (project: object) => post<{ file: string }>("init", project);
 
+/** A board that the system fits; see fusesoc_firm/studio/boards.py. */
+export interface Offer {
+  name: string;
+  description: string;
+  /** Whether the tools of the board's maker build for it: `command` sets up their project. */
+  isProject: boolean;
+  command: string;
+  folder: string;
+  /** How to install missing programs. */
+  missing: string;
+  loader: boolean;
+}
+
+/** A build for a board, or its loading: the last step, then the result; paths are relative to the folder. */
+export interface Job {
+  file: string;
+  version: string;
+  board: string;
+  folder: string;
+  state: "running" | "done" | "failed" | "cancelled";
+  /** In seconds since 1970. */
+  start: number;
+  step?: string;
+  number?: number;
+  count?: number;
+  line?: string;
+  bitstream?: string;
+  log?: string;
+  next?: string;
+  /** In MHz. */
+  clocks?: { name: string; reached: number; needed: number }[];
+  area?: { name: string; used: number; available: number }[];
+  faults?: Fault[];
+  output?: string[];
+}
+
+export type Jobs = Partial<Record<"bitstream" | "load", Job>>;
+
+export const boards = (file: string) => get<{ boards: Offer[] }>("boards", { file });
+export const bitstream = (file: string, board: string) => post<object>("bitstream", { file, board });
+export const load = (file: string, board: string, flash: boolean) => post<object>("load", { file, board, flash });
+export const cancel = () => post<object>("cancel", {});
+
 /** Call a function whenever another program has changed a file; reconnects if the server was restarted. */
 export function follow(changed: (file: string) => void): () => void {
   let socket: WebSocket | undefined;

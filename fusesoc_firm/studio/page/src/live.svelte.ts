@@ -1,6 +1,6 @@
 // What the page knows of the current run: counts and rates of each block, and the latest messages.
 
-import { address } from "./api";
+import { address, type Jobs } from "./api";
 import type { WireData } from "./graph";
 import { since, waitsOf, waitWords, type Wait, type Waits, type Way } from "./waits";
 
@@ -58,6 +58,7 @@ interface Report {
   skipped?: number;
   messages?: Row[];
   figures?: Figures;
+  jobs?: Jobs;
 }
 
 /** What a drawn wire shows of a run; `waiting` is the class of its style. */
@@ -109,6 +110,8 @@ export class Live {
   /** The longest of the latest latencies of each block, in cycles. */
   longest = $state.raw<Record<string, number>>({});
   isFollowing = $state(true);
+  /** The latest builds for boards. */
+  jobs = $state.raw<Jobs>({});
   /** The waits of an opened message, which the wires show instead of the present ones. */
   past = $state.raw<Waits | null>(null);
   #present = $state.raw<Waits | null>(null);
@@ -186,7 +189,8 @@ export class Live {
     };
   }
 
-  #take({ run, first, last, skipped, messages, figures }: Report, isFirst: boolean) {
+  #take({ run, first, last, skipped, messages, figures, jobs }: Report, isFirst: boolean) {
+    if (jobs || isFirst) this.jobs = jobs ?? {};
     const isNew = isFirst || (run !== undefined && run?.number !== this.run?.number);
     if (isNew) {
       this.#history = [];
