@@ -1,9 +1,11 @@
-"""The view 'board' in the browser: what a build shows while it runs and at its end."""
+"""The view 'board' in the browser, and the three steps of a first visit, which end with a bitstream."""
 
 from __future__ import annotations
 
+import asyncio
 import json
 import shlex
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -11,11 +13,12 @@ import pytest
 from fusesoc_firm.studio import boards
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
-from tests.studio.browser import PROGRAM, Page
-from tests.studio.played import write_system
+from tests.studio.browser import PROGRAM, Page, shared_browser
+from tests.studio.played import modelled, write_system
+from tests.studio.served import served
 from tests.studio.test_page import AXE, ROOM
 from tests.studio.test_sight import WINDOWS, measure, seen
-from tests.studio.test_watching import press, violations
+from tests.studio.test_watching import ROWS, press, violations
 
 pytestmark = [
     pytest.mark.check,
@@ -60,6 +63,7 @@ BY_HAND = {
     ],
 }
 VIEW = "document.querySelector('.view')"
+STEPS = "document.querySelector('.steps')"
 
 
 def firm(folder: Path, monkeypatch: pytest.MonkeyPatch, *lines: object, then: str = "") -> None:
@@ -182,3 +186,69 @@ def test_a_build_outlives_its_page_and_keeps_the_rules_of_accessibility(
         assert await violations(page) == []
 
     seen(write_project(tmp_path), tmp_path, (1400, 900), steps)
+
+
+def visits(folder: Path, *steps: Callable[[Page], Awaitable[None]]) -> None:
+    """Open the page of a project with one browser several times, each time of a new server."""
+    spec = write_project(folder)
+
+    async def visit(address: str, page: Page, step: Callable[[Page], Awaitable[None]]) -> None:
+        await page.call("Page.navigate", url=address)
+        await page.until("document.querySelector('header output')?.textContent === 'no faults'")
+        await step(page)
+        assert page.trouble == []
+        await page.call("Page.navigate", url="about:blank")
+
+    async def all_visits() -> None:
+        async with shared_browser().opened("about:blank") as page:
+            for step in steps:
+                with served(spec, modelled()) as studio:
+                    await visit(studio.address, page, step)
+
+    asyncio.run(all_visits())
+
+
+def test_a_first_visit_leads_through_three_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is done when the thing is done, and the browser remembers that for servers at other ports."""
+    firm(tmp_path, monkeypatch, DONE)
+    current = f"{STEPS}.querySelector('[aria-current]')"
+
+    async def first(page: Page) -> None:
+        await measure(page)
+        assert await page.evaluate(f"{current}.textContent") == "1change something"
+        await page.click(".steps [aria-current]")
+        await page.until("document.querySelector('aside h2').textContent === 'subscriber point'")
+        # A look is not a change.
+        assert await page.evaluate(f"{STEPS}.querySelectorAll('.done').length") == 0
+        await page.evaluate("document.querySelector('.connect select').focus()")
+        await page.choose(".connect select", "text_out")
+        await page.until(f"{current}.textContent === '2simulate'")
+        await page.until("!document.querySelector('header button:nth-of-type(2)').disabled")
+        await press(page, "undo", "header")
+
+    async def second(page: Page) -> None:
+        assert await page.evaluate(f"{current}.textContent") == "2simulate"
+        await page.click(".steps [aria-current]")
+        await page.until(f"{ROWS}.length > 1")
+        await page.until(f"{current}.textContent === '3bitstream for a board'")
+        await page.click(".steps [aria-current]")
+        await page.until(f"{VIEW}?.querySelector('select').value === 'icebreaker'")
+        await build(page, "The bitstream is built")
+        await page.until(f"{STEPS}.innerText.includes('All three are done.')")
+        assert await page.evaluate(f"{STEPS}.querySelectorAll('.done').length") == 3
+
+    async def third(page: Page) -> None:
+        assert await page.evaluate(STEPS) is None
+
+    visits(tmp_path, first, second, third)
+
+
+def test_the_steps_are_closed_for_good(tmp_path: Path) -> None:
+    async def first(page: Page) -> None:
+        await page.click(".steps > button")
+        await page.until(f"{STEPS} === null")
+
+    async def second(page: Page) -> None:
+        assert await page.evaluate(STEPS) is None
+
+    visits(tmp_path, first, second)
