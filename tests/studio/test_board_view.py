@@ -109,6 +109,7 @@ def test_a_build_is_readable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, si
             firm(tmp_path, monkeypatch, STEP, result)
             await build(page, words)
             await measure(page)
+            assert await page.evaluate(f"{VIEW}.scrollWidth - {VIEW}.clientWidth") == 0
         assert "25.9 MHz reached" in await page.evaluate(f"{VIEW}.innerText")
         firm(tmp_path, monkeypatch, BY_HAND)
         await press(page, "load onto the board", ".view")
