@@ -11,16 +11,17 @@ from __future__ import annotations
 import re
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
+from fusesoc_firm.accelerator.vhdl_hints import hint, is_at_end, is_syntax, is_unanalysed, missing_clause
 from fusesoc_firm.netlist import dump
 from fusesoc_firm.netlist.corrections import lost_latches
-from fusesoc_firm.netlist.instantiated import entities
+from fusesoc_firm.netlist.instantiated import Entity, entities
 from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.text.outputs import shown
@@ -38,6 +39,7 @@ _LENGTH = re.compile(
     r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*mismatching vector length;"
     r" got (?P<found>\d+), expect (?P<needed>\d+)"
 )
+_OUT_OF_BOUNDS = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*out of bound expression")
 _LATCH = re.compile(r"^.*latch infered for net .*(?= \(use --latches\))", re.MULTILINE)
 _PLACED = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?: ?error:)? ?(?P<text>.+)")
 _INSTANCE = re.compile(r"(\w+)\s*:\s*(?:entity\s+)?(?:\w+\s*\.\s*)?(\w+)\s+(?:generic|port)\s+map", re.IGNORECASE)
@@ -96,7 +98,7 @@ class VhdlReader:
         # The declarations in a missing unit are unknown, so further messages are irrelevant.
         is_known = self._known.is_complete and not any(match["unit"] in self._known.generated for match in absent)
         for text, source in messages if is_known or not absent else ():
-            faults.error(text, source, self._hint(text))
+            faults.error(text, source, self._hint(text, source))
         if not messages:
             self._report_sources(paths, top, generics, faults)
         tree = self._all_entities or self._tree(paths) or self._tree(paths[-1:])
@@ -141,15 +143,22 @@ class VhdlReader:
                 return [item.placed() for item in messages]
         return []
 
-    def _hint(self, text: str) -> str:
+    def _hint(self, text: str, source: SourceRef) -> str:
         """Return a hint about a fault, such as the core with a missing library or unit, or an empty text."""
-        if text.startswith("infinite loop"):
-            return "list the signals that start the process: 'process (clk)'"
-        if text.startswith('no declaration for "firm"'):
-            return "write 'library firm;' at the top of the file"
-        found = _MISSING_UNIT.match(text)
-        name = self._known.core_with(found["library"] or found["of"], found["unit"] or "") if found else ""
-        return f"it is in {name}, on which the accelerator's core must depend" if name else ""
+        if found := _MISSING_UNIT.match(text):
+            name = self._known.core_with(found["library"] or found["of"], found["unit"] or "")
+            return f"it is in {name}, on which the accelerator's core must depend" if name else ""
+        path = Path(source.file)
+        return hint(text, lines_of(path), self._formals(path, source))
+
+    def _formals(self, path: Path, source: SourceRef) -> Sequence[str]:
+        """Return the legal names at a place before '=>' in the map of an instance of an entity in another core."""
+        _, entity = self._instance(path, source.line)
+        if entity is None or not re.match(r"\w+\s*=>", source.text[source.column - 1 :]):
+            return ()
+        text = "\n".join([*lines_of(path)[: source.line - 1], source.text[: source.column]]).lower()
+        is_generic = text.rfind("generic map") > text.rfind("port map")
+        return [name for name in entity.names if (name in entity.generics) == is_generic]
 
     def _report_sources(
         self, paths: Sequence[Path], top: str, generics: Mapping[str, int], faults: Diagnostics
@@ -165,20 +174,31 @@ class VhdlReader:
         done = self._run("--synth", [*options, top])
         lines = dict.fromkeys(done.stderr.splitlines())
         self._report_latches(done, paths, faults)
-        for match in filter(None, map(_LENGTH.match, lines)):
-            if (path := Path(match["file"])) in paths:
-                source = place(path, int(match["line"]), int(match["column"]))
-                message = f"{match['found']} bits, but {match['needed']} are needed here"
-                faults.error(message, source, self._generics_hint(path, int(match["line"])))
+        is_connected = not self._report_lengths(lines, paths, faults)
         several = "keep one source: an assignment, a process or an output of an instance; remove the others"
-        for pattern, report, message, hint in (
+        for pattern, report, message, cure in (
             (_TWO_SOURCES, faults.error, "'{}' has more than one source", several),
             (_NO_SOURCE, faults.warn, "output '{}' has no source", "assign it a value"),
         ):
             for match in filter(None, map(pattern.match, lines)):
-                if Path(match["file"]) in paths:
+                # GHDL drops an assignment of a wrong length.
+                if Path(match["file"]) in paths and (is_connected or pattern is not _NO_SOURCE):
                     source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
-                    report(message.format(match["name"]), source, hint)
+                    report(message.format(match["name"]), source, cure)
+
+    def _report_lengths(self, lines: Iterable[str], paths: Sequence[Path], faults: Diagnostics) -> bool:
+        """Add lengths that differ, and return whether there are any."""
+        count = len(faults.found)
+        for line in lines:
+            if (match := _LENGTH.match(line) or _OUT_OF_BOUNDS.match(line)) and (path := Path(match["file"])) in paths:
+                source = place(path, int(match["line"]), int(match["column"]))
+                if match.re is _LENGTH:
+                    message = f"{match['found']} bits, but {match['needed']} are needed here"
+                    faults.error(message, source, self._generics_hint(path, int(match["line"])))
+                else:
+                    cure = "compare the ranges: a slice is value(7 downto 0), and resize(value, 32) is in numeric_std"
+                    faults.error("the value does not have as many bits as its target", source, cure)
+        return len(faults.found) > count
 
     def _report_latches(
         self, done: subprocess.CompletedProcess[str], paths: Sequence[Path], faults: Diagnostics
@@ -188,21 +208,28 @@ class VhdlReader:
         if not done.returncode:
             modules = dump.read(done.stdout)
             sentences += [*lost_latches(modules), *loops(modules)]
-        hint = "assign it in every branch of its process, or only at a clock edge"
+        cure = "assign it in every branch of its process, or only at a clock edge"
         for match in filter(None, map(_PLACED.match, sentences)):
             if (path := Path(match["file"])) in paths:
-                faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), hint)
+                faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), cure)
 
     def _generics_hint(self, path: Path, line: int) -> str:
         """Return a hint if the last instance above a line is of an entity with generics in another core."""
-        instances = _INSTANCE.findall("\n".join(lines_of(path)[:line]))
-        if not instances:
-            return ""
-        label, name = instances[-1]
-        files = {str(file) for file, _ in self._known.files}
-        entity = {key.lower(): item for key, item in entities({"": sorted(files)}).items()}.get(name.lower())
+        label, entity = self._instance(path, line)
         generics = ", ".join(entity.generics) if entity else ""
-        return f"the generics of '{label}' select the size: {generics} of {name}" if generics else ""
+        return f"the generics of '{label}' select the size: {generics} of {entity.name}" if entity and generics else ""
+
+    def _instance(self, path: Path, line: int) -> tuple[str, Entity | None]:
+        """Return the label of the last instance above a line, and its entity if that is in another core."""
+        instances = _INSTANCE.findall("\n".join(lines_of(path)[:line]))
+        label, name = instances[-1] if instances else ("", "")
+        return label, self._others.get(name.lower())
+
+    @property
+    def _others(self) -> Mapping[str, Entity]:
+        """The entities in the files of other cores, by their names in lower case."""
+        files = {str(file) for file, _ in self._known.files}
+        return {name.lower(): entity for name, entity in entities({"": sorted(files)}).items()}
 
     def _packages(self) -> list[Path]:
         return [self._written(f"package_{number}.vhd", text) for number, text in enumerate(self._known.packages)]
@@ -265,7 +292,30 @@ def _messages(output: str) -> Iterator[_Message]:
         else:
             text = _OPTION.sub("", match["text"])
             found.append(_Message(text, match["file"], int(match["line"]), int(match["column"])))
-    yield from dict.fromkeys(found)
+    yield from _without_consequences(list(dict.fromkeys(found)))
+
+
+def _without_consequences(found: Sequence[_Message]) -> Iterator[_Message]:
+    """Yield messages without those that follow from an earlier one.
+
+    These are further faults in the syntax of a line or at the file's end, further names of a missing package, whose
+    types have no operators, and the architecture of an entity with faults.
+    """
+    lines: set[tuple[str, int]] = set()
+    clauses: set[str] = set()
+    is_ended = False
+    for message in found:
+        line, clause = (message.file, message.line), missing_clause(message.text)
+        if is_syntax(message.text):
+            follows = is_ended or line in lines or (is_at_end(message.text) and bool(lines))
+            lines.add(line)
+            is_ended |= is_at_end(message.text)
+        else:
+            follows = clause in clauses or (bool(clauses) and message.text.startswith("no function declarations"))
+            follows |= is_unanalysed(message.text) and message is not found[0]
+            clauses |= {clause} - {""}
+        if not follows:
+            yield message
 
 
 def _declarations(text: str) -> str:

@@ -29,6 +29,7 @@ _GENERIC = re.compile(r"\s*(?:constant\s+)?([\w\s,]+?)\s*:\s*(?:in\s+)?(\w+)[^:]
 _VECTORS = ("std_logic_vector", "std_ulogic_vector", "unsigned", "signed", "bit_vector")
 _BITS = ("std_logic", "std_ulogic", "bit")
 _WORDS = re.compile(r"\w+")
+_DECLARED = re.compile(r"[(;]\s*(?:signal\s+|constant\s+)?(\w+(?:\s*,\s*\w+)*)\s*:", re.IGNORECASE)
 # What a file in Verilog defines; a file without a unit is included by others.
 _UNIT = re.compile(r"^[ \t]*(?:module|macromodule|package|interface)\s+(?:automatic\s+|static\s+)?(\w+)", re.MULTILINE)
 
@@ -84,6 +85,11 @@ class Entity:
     path: Path
     generics: Mapping[str, Generic]
     interface: str
+
+    @property
+    def names(self) -> Sequence[str]:
+        """The names of the generics and ports, in their order."""
+        return [word for names in _DECLARED.findall(self.interface) for word in _WORDS.findall(names)]
 
     def spelt(self, port: str) -> str:
         """Return the name of a port as spelt in the source, since the netlist does not preserve the case."""

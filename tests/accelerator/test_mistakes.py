@@ -227,6 +227,53 @@ def test_a_mistake_in_vhdl(old: str, new: str, where: str, message: str) -> None
         assert not found, [str(item) for item in found]
 
 
+_OUT, _READY = "out_data <= (others => '0');", "in_msg_ready <= is_there and out_msg_ready;"
+_PROCESS = "process (clk)\n  begin\n    if rising_edge(clk) then\n      out_data <= in_step;\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ("library ieee;\nuse ieee.std_logic_1164.all;\n", "", "'use ieee.std_logic_1164.all;' above the entity"),
+        (
+            "use ieee.std_logic_1164.all;\n",
+            "use ieee.std_logic_1164.all;\nuse ieee.std_logic_unsigned.all;\n",
+            "numeric_std",
+        ),
+        (_OUT, "out_data <= std_logic_vector(unsigned(in_step) + to_unsigned(1, 32));", "'use ieee.numeric_std.all;'"),
+        (_OUT, "out_data <= in_step + 1;", "a std_logic_vector is not a number"),
+        (_OUT, "out_data <= in_step and '1';", "both sides need the same type"),
+        (_OUT, "out_data <= in_stp;", "did you mean 'in_step'?"),
+        (_OUT, "out_data <= in_step when in_msg_valid;", "a condition is a comparison, such as valid = '1'"),
+        (_OUT, "out_data <= '0';", "a vector is a string of bits"),
+        (_OUT, "out_data <= 5;", "to_unsigned(5, 8)"),
+        (_OUT, "out_data := in_step;", "with '<='"),
+        (_OUT, "process (clk) begin out_data = in_step; end process;", "a variable with ':='"),
+        (_OUT, "process (all) begin out_data <= in_step; end process;", "write 'standard: 2008' for this accelerator"),
+        (_OUT, f"{_PROCESS}    end if;\n", "an 'end process;' is missing above"),
+        (_OUT, f"{_PROCESS}  end process;\n", "an 'end if;' is missing above"),
+        (_READY, "in_msg_ready <= out_segment_valid(0);", "assign a signal, and the port from it"),
+        ("    clk   : in  std_logic;", "    clk   : in  std_logic", "is a ';' missing at the end of the line above?"),
+        ("out_msg_ready                  : in  std_logic\n", "out_msg_ready : in std_logic;\n", "has no ';'"),
+        ("end architecture;", "", "an 'end' is missing"),
+        ("architecture rtl of img", "architecture rtl of image", "the entity in this file is 'img'"),
+        (_OUT, "out_data <= in_step(15 downto 0);", "compare the ranges"),
+    ],
+)
+def test_a_mistake_in_vhdl_is_one_fault_with_a_cure(old: str, new: str, hint: str) -> None:
+    """GHDL names no cure, and lists what follows: every use of a missing package, the end of each open statement."""
+    (fault,) = diagnostics("vhdl", old, new)
+    assert not fault.is_warning
+    assert hint in fault.hint
+
+
+def test_faults_in_several_lines_are_all_reported() -> None:
+    found = diagnostics("vhdl", _OUT, "out_data <= in_stp;\n  is_ther <= in_msg_vald;")
+    assert [item.hint for item in found] == [
+        f"did you mean '{name}'?" for name in ("in_step", "is_there", "in_msg_valid")
+    ]
+
+
 @pytest.mark.parametrize(("old", "new", "where", "message"), VERILOG)
 def test_a_mistake_in_verilog(old: str, new: str, where: str, message: str) -> None:
     check(diagnostics("verilog", old, new), "img/rtl/img.v", where, message)
@@ -337,6 +384,20 @@ def test_a_float_of_the_wrong_size_in_vhdl() -> None:
     assert fault.source
     assert "in_a => in_step" in fault.source.text
     assert fault.hint.endswith("EXPONENT_BITS, MANTISSA_BITS of firm_float_multiply")
+
+
+@pytest.mark.parametrize(
+    ("part", "hint"),
+    [
+        ("generic map (EXPONENT_BIT => 8) port map (clk => clk)", "did you mean 'EXPONENT_BITS'?"),
+        ("port map (clk => clk, x => in_step)", "legal here: clk, rst_n, in_valid, in_ready, in_a, in_b, out_"),
+    ],
+)
+def test_an_unknown_name_in_the_map_of_an_instance(part: str, hint: str) -> None:
+    libraries = Libraries([(path, "firm") for path in core_files("acc/float/float")], is_complete=True)
+    new = f"library firm;\narchitecture rtl of img is\nbegin\n  u : entity firm.firm_float_multiply {part};\n"
+    found = diagnostics("vhdl", "architecture rtl of img is", f"{new}end;\narchitecture other of img is", libraries)
+    assert any(item.hint.startswith(hint) for item in found), [str(item) for item in found]
 
 
 def test_the_library_of_the_arithmetic_is_named() -> None:
