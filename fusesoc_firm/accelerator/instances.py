@@ -85,10 +85,12 @@ class Instances:
                 hint = f"the parameters {parameters} select the size" if parameters else ""
                 message = f"port '{name}' of '{unit.name}' has {port.bits} bits here, and is connected to {len(bits)}"
                 faults.error(message, source, hint)
-        for name, port in ports.items():
-            # In the netlist, an input has no default value.
-            if port.direction == "in" and not cell["connections"].get(name):
-                faults.error(f"input '{name}' of '{unit.name}' is not connected", source, "connect it")
+        # In the netlist, an input has no default value.
+        is_open = {name: port.direction == "in" and not cell["connections"].get(name) for name, port in ports.items()}
+        if absent := [f"'{name}'" for name in ports if is_open[name]]:
+            what = f"input {absent[0]}" if len(absent) == 1 else f"inputs {', '.join(absent[:-1])} and {absent[-1]}"
+            verb, it = ("is", "it") if len(absent) == 1 else ("are", "them")
+            faults.error(f"{what} of '{unit.name}' {verb} not connected", source, f"connect {it}")
 
     def _report_missing(self, kind: str, source: SourceRef, faults: Diagnostics) -> None:
         if core := core_with(kind):

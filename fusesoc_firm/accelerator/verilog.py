@@ -10,7 +10,7 @@ from typing import Any
 
 from fusesoc_firm.accelerator.instances import Instances
 from fusesoc_firm.accelerator.rtlil import read_modules, source_faults
-from fusesoc_firm.accelerator.unit import Unit, UnitPort, place
+from fusesoc_firm.accelerator.unit import Unit, UnitPort, lines_of, place
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.tools.yosys import Yosys, is_system_verilog, source_place
 
@@ -30,6 +30,12 @@ _LATCH = re.compile(
     r"(?:    .*\n)*?    connect \\Q \\?(?P<name>\S+)",
     re.MULTILINE,
 )
+# What Yosys' parser did not expect, and what it did expect.
+_UNEXPECTED = re.compile(
+    r"syntax error, unexpected (?P<token>'[^']+'|a name|end of file)(?:, expecting (?P<expected>.+))?"
+)
+_SYSTEM_WORD = re.compile(r"\b(logic|always_ff|always_comb|always_latch|int|bit|byte|typedef|enum|struct|import)\b")
+_COMMENT = re.compile(r"//.*")
 _DIRECTIONS = {"input": "in", "output": "out"}
 
 
@@ -99,8 +105,8 @@ class VerilogReader:
     def _report(self, output: str, paths: Sequence[Path], faults: Diagnostics) -> None:
         """Report Yosys' error, except in SystemVerilog, which simulators support better than Yosys."""
         match = next(filter(None, map(_ERROR.match, output.splitlines())), None)
-        if match and not is_system_verilog([Path(match["file"])]):
-            faults.error(_readable(match["text"]), _line(match))
+        if match and not is_system_verilog([path := Path(match["file"])]):
+            faults.error(*_syntax_fault(_readable(match["text"]), path, int(match["line"])))
 
 
 def _name(name: str, module: Mapping[str, Any]) -> str:
@@ -135,6 +141,30 @@ def _line(match: re.Match[str]) -> SourceRef:
     return place(Path(match["file"]), int(match["line"]), 0)
 
 
+def _syntax_fault(text: str, path: Path, line: int) -> tuple[str, SourceRef, str]:
+    """Return a message of Yosys' parser with its place and its probable cure."""
+    lines = lines_of(path)
+    found = _UNEXPECTED.match(text)
+    if found and found["token"] == "end of file":
+        last = max((number for number, item in enumerate(lines, start=1) if item.strip()), default=1)
+        return text, place(path, last, 0, lines=lines), "an 'endmodule' or a 'begin' without 'end' is missing above"
+    source = place(path, line, 0, lines=lines)
+    if not found:
+        return text, source, ""
+    code = _COMMENT.sub("", source.text)
+    token = found["token"].strip("'")
+    if word := re.search(rf"\b{token}\b", code) if token.isalpha() else None:
+        source = place(path, line, word.start() + 1, len(token), lines)
+    if system := _SYSTEM_WORD.search(code):
+        return text, source, f"'{system[1]}' is SystemVerilog, whose files end in .sv: rename {path.name}"
+    if found["expected"] == "';'" or token == "endmodule":
+        return text, source, "is a ';' or an 'end' missing above?"
+    if token in ("=", "<=") and "if" not in code:
+        return text, source, "write 'assign' before it, or put it into an 'always' block"
+    return text, source, "is a ';' or an 'end' missing above?" if word else ""
+
+
 def _readable(text: str) -> str:
     """Return a message of Yosys' parser without the parser's internal names of tokens."""
+    text = text.replace("TOK_ID", "a name").replace("OP_LE", "'<='")
     return re.sub(r"\bTOK_(\w+)", lambda match: f"'{match[1].lower()}'", text)

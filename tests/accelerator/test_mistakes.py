@@ -188,7 +188,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def diagnostics(language: str, old: str, new: str, libraries: Libraries | None = None) -> list[Diagnostic]:
+def diagnostics(
+    language: str, old: str, new: str, libraries: Libraries | None = None, copy: str = _COPY
+) -> list[Diagnostic]:
     """The faults and warnings about a new project whose accelerator is changed at one place."""
     arguments = ("--language", language, "--in", "sensor_msgs/Image", "--out", "std_msgs/UInt32")
     assert main(["init", "img", *arguments]) == 0
@@ -196,8 +198,7 @@ def diagnostics(language: str, old: str, new: str, libraries: Libraries | None =
     # The analysis has no files of this library.
     text = re.sub("library firm;.*\n", "", source.read_text(encoding="utf-8"))
     assert old in text
-    copy = _COPY if language == "verilog" else ""
-    source.write_text(text.replace(old, new, 1) + copy, encoding="utf-8")
+    source.write_text(text.replace(old, new, 1) + copy * (language == "verilog"), encoding="utf-8")
     loaded = load_beside(Path("img/img.yaml"))
     try:
         return list(check_accelerators(loaded, lambda: libraries or Libraries(is_complete=True)))
@@ -279,6 +280,36 @@ def test_a_mistake_in_verilog(old: str, new: str, where: str, message: str) -> N
     check(diagnostics("verilog", old, new), "img/rtl/img.v", where, message)
 
 
+_BLOCK = "reg [31:0] r; always @(posedge clk) "
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "hint"),
+    [
+        ("endmodule", "", "in_data_axis_tready", "an 'endmodule' or a 'begin' without 'end' is missing above"),
+        (_ZERO, "assign out_data = 32'b0", "assign in_header_frame", "is a ';' or an 'end' missing above?"),
+        (
+            _ZERO,
+            f"{_BLOCK} begin r <= in_step;\n  assign out_data = r;",
+            "assign out_data",
+            "is a ';' or an 'end' missing",
+        ),
+        (_ZERO, f"logic [31:0] r; {_ZERO}", "logic", "'logic' is SystemVerilog, whose files end in .sv: rename img.v"),
+        (_ZERO, "always_comb out_data = 32'b0;", "always_comb", "'always_comb' is SystemVerilog"),
+        (_ZERO, "out_data = 32'b0;", "out_data", "write 'assign' before it, or put it into an 'always' block"),
+        (_ZERO, f"{_BLOCK} if (in_step = 1) r <= 1;", "always", ""),
+    ],
+)
+def test_a_fault_in_the_syntax_of_verilog_has_a_cure(old: str, new: str, where: str, hint: str) -> None:
+    """Yosys reports a missing 'endmodule' in the first line of the file."""
+    (fault,) = diagnostics("verilog", old, new, copy="")
+    assert "syntax error, unexpected" in fault.message
+    assert hint in fault.hint
+    assert bool(hint) == bool(fault.hint)
+    assert fault.source
+    assert where in fault.source.text
+
+
 @pytest.mark.parametrize("new", LEGAL_VERILOG)
 def test_signals_in_verilog_with_right_sources(new: str) -> None:
     assert diagnostics("verilog", _ZERO, new) == []
@@ -343,6 +374,11 @@ _PORTS = (
             f"firm_float_add {_PARAMETERS} u ({_PORTS});",
             "input 'in_subtract' of 'firm_float_add' is not connected",
             "connect",
+        ),
+        (
+            f"firm_float_multiply {_PARAMETERS} u (.clk(clk), .rst_n(rst_n), .in_valid(1'b1), .out_ready(1'b1));",
+            "inputs 'in_a' and 'in_b' of 'firm_float_multiply' are not connected",
+            "connect them",
         ),
         (f"firm_float_multiply {_PARAMETERS} u (clk, rst_n);", "its ports are connected by name", ".port(net)"),
         (
