@@ -20,7 +20,7 @@ from fusesoc_firm.core.core_reader import CoreFile
 from fusesoc_firm.core.request import GeneratorCall
 from fusesoc_firm.runs.simulation import simulation_core
 from fusesoc_firm.system.system_core import load_requested
-from fusesoc_firm.text.diagnostics import Diagnostics, nearest_file
+from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest_file
 from fusesoc_firm.text.outputs import shown
 
 _SIMULATION = "sim"
@@ -39,9 +39,8 @@ def check_core(file: CoreFile, *, may_run: bool = False) -> None:
     try:
         core = fusesoc.get_core(name)
     except (DependencyError, SyntaxError):
-        faults.error(f"FuseSoC does not know the core '{name}'", file.place_of(name), ignored(fusesoc, name))
-        core = None
-    for target in core.get_data({}).targets if core else ():
+        fail(f"FuseSoC does not know the core '{name}'", file.place_of(name), ignored(fusesoc, name))
+    for target in core.get_data({}).targets:
         _check_target(core, target, faults)
     for call in _calls(fusesoc, core, faults):
         with faults.noting():

@@ -126,11 +126,15 @@ def check_all(
     all parts.
     """
     from fusesoc_firm.builds.check import check_core
+    from fusesoc_firm.builds.setup.core_schema import check_loadable
     from fusesoc_firm.fabric.ethernet import ethernet_node
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.runs.simulation.software_run import system_stimuli
     from fusesoc_firm.system.message_sources import check_specs_of, core_of
 
+    core = core_of(spec) if with_core else None
+    if core:
+        check_loadable(Path(shown(core.path)))
     faults = Diagnostics()
     warnings: tuple[Diagnostic, ...] = ()
     with faults.noting():
@@ -143,7 +147,6 @@ def check_all(
         ethernet_node(loaded.system, loaded.libraries)
     # What the user's model prints is not part of the answer.
     with faults.noting(), redirect_stdout(sys.stderr):
-        core = core_of(spec) if with_core else None
         if core:
             check_core(core, may_run=may_run)
         elif with_core:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fusesoc_firm.text.diagnostics import fail, nearest_file
+from fusesoc_firm.text.outputs import shown
 
 
 def spec_here(folder: Path = Path()) -> Path:
@@ -27,8 +28,8 @@ def _only(paths: Sequence[Path], folder: Path, what: str, named: str) -> Path:
     if len(paths) != 1:
         where = "This folder" if folder == Path() else str(folder)
         names = " or ".join(map(str, paths)) or f"no {what}"
-        below = [path.parent for path in sorted(folder.glob("*/fusesoc.conf"))]
-        next_step = f"cd {below[0]}" if below else "firm init"
+        near = [*sorted(folder.glob("*/fusesoc.conf")), *filter(Path.is_file, [folder / "../fusesoc.conf"])]
+        next_step = f"cd {near[0].parent}" if near else "firm init"
         fail(f"which system? {where} has {names}", hint=f"name {named}" + f", or run '{next_step}'" * (not paths))
     return paths[0]
 
@@ -38,6 +39,7 @@ def core_named(system: str | None) -> tuple[str, Path | None]:
 
     `system` is a specification or a core's file, the folder with one, a core's name, or None for the current folder.
     """
+    from fusesoc_firm.builds.setup.core_schema import check_loadable
     from fusesoc_firm.builds.setup.simulation import core_name
     from fusesoc_firm.system.message_sources import check_specs_of, core_of
 
@@ -49,6 +51,7 @@ def core_named(system: str | None) -> tuple[str, Path | None]:
     if not path.is_file():
         fail(f"there is no file {path}", hint=nearest_file(path))
     if path.suffix == ".core":
+        check_loadable(path)
         return core_name(path), path.parent
     core = core_of(path)
     if core is None:
@@ -57,4 +60,5 @@ def core_named(system: str | None) -> tuple[str, Path | None]:
             f"no core for {path} is beside it",
             hint=f"write it: firm system core {path}, with --depend CORE for each core that it uses",
         )
+    check_loadable(Path(shown(core.path)))
     return str(core.data.get("name", "")), path.parent

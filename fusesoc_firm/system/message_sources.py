@@ -18,7 +18,7 @@ from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.system.written.specification import Draft
-from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest_file
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 from fusesoc_firm.text.yaml_text import read_yaml
 
 # The generator instance that generates the system.
@@ -61,6 +61,11 @@ def specs_in(folder: Path) -> list[Path]:
     """
     if found := dict.fromkeys(spec for core in cores_in(folder) if (spec := spec_of(core))):
         return [*found]
+    return _specs_alone(folder)
+
+
+def _specs_alone(folder: Path) -> list[Path]:
+    """Return the YAML files in a folder with the keys of a specification."""
     alone = []
     for path in sorted(folder.glob("*.yaml")):
         # Faults in unrelated files are not of interest.
@@ -76,7 +81,9 @@ def check_specs_of(folder: Path) -> None:
         spec, core = spec_of(path), read_core(path)
         item = core.item("generate", _INSTANCE, "parameters", "spec")
         if spec and item and not spec.is_file():
-            fail(f"there is no specification {spec}", core.source(item[1]), nearest_file(spec))
+            near = [*sorted(spec.parent.glob(f"*/{spec.name}")), *_specs_alone(spec.parent)]
+            hint = nearest(spec.name, [str(item.relative_to(spec.parent)) for item in near])
+            fail(f"there is no specification {spec}", core.source(item[1]), hint)
 
 
 def spec_of(core: Path) -> Path | None:

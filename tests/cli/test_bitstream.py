@@ -164,6 +164,7 @@ def test_a_bitstream_is_loaded(capsys: Captured, tmp_path: Path, monkeypatch: py
         ),
         (["load", "tlt.yaml"], "there is no file tlt.yaml\n      = did you mean 'tilt.yaml'?"),
         (["load", "robot:sys:tlit"], "unknown core 'robot:sys:tlit'\n      = did you mean 'robot:sys:tilt'?"),
+        (["load", "robot:sys:tilt:7"], "unknown version of core 'robot:sys:tilt:7'\n      = known versions: 0.1.0"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

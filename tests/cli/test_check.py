@@ -70,6 +70,12 @@ def test_a_sound_project_is_valid(capsys: Captured) -> None:
             "tilt.core:22:7: error: unknown parameter",
         ),
         ("tilt.core", "tilt.yaml", "tlit.yaml", "tilt.core:17:13: error: there is no specification tlit.yaml"),
+        ("tilt.core", "CAPI=2:\n", "", "tilt.core:1:1: error: the first line of a core must be 'CAPI=2:'"),
+        ("tilt.core", "filesets:\n", "filset:\n", "tilt.core:6:1: error: a core has no key 'filset'"),
+        ("tilt.core", "    depend:\n", "    depends:\n", "tilt.core:8:5: error: 'filesets.base' has no key 'depends'"),
+        ("tilt.core", "targets:\n", "targets: []\nx:\n", "tilt.core:"),
+        ("tilt.core", "name: robot:sys:tilt:0.1.0\n", "", "tilt.core:1:1: error: a core needs the key 'name'"),
+        ("tilt.core", "robot:sys:tilt:0.1.0", "robot:sys:ti lt:0.1.0", "tilt.core:3:7: error: Illegal character"),
         ("tilt.core", "[system, simulation]", "[system, simulatoin]", "tilt.core:"),
         ("tilt.core", "filesets: [base]", "filesets: [bse]", "tilt.core:"),
         ("tilt.core", "robot:acc:firm_float", "robot:acc:firm_flaot", "tilt.core:10:9: error: unknown core"),
@@ -112,6 +118,34 @@ def test_a_check_reads_python_and_a_simulation_runs_it(capsys: Captured) -> None
     found = faults(capsys, "sim")
     assert "model.py:10:14: error: the model raised KeyError for message 0 to 'sub': 'zz'" in found
     assert found.count("{'x': ") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ("filesets:\n", "filset:\n", "did you mean 'filesets'?"),
+        ("robot:acc:firm_float", "robot:acc:firm_flaot", "did you mean 'robot:acc:firm_float'?"),
+        ("spec: tilt.yaml", "spec: tlit.yaml", "did you mean 'tilt.yaml'?"),
+    ],
+)
+def test_a_fault_in_the_core_ends_every_command_with_its_cure(old: str, new: str, hint: str, capsys: Captured) -> None:
+    """FuseSoC ignores such a file, and then knows no core of its name."""
+    edit("tilt.core", old, new)
+    for words in (["check"], ["sim"], ["bitstream", "--board", "icebreaker"]):
+        assert hint in faults(capsys, *words)
+
+
+def test_stimuli_that_are_missing_are_not_taken_for_the_specification(capsys: Captured) -> None:
+    Path("stimuli.yaml").rename("stimul.yaml")
+    assert "did you mean 'stimul.yaml'?" in faults(capsys, "check")
+    Path("stimul.yaml").unlink()
+    assert "= legal here: a bag, or a YAML file with a list of messages" in faults(capsys, "check")
+
+
+def test_a_specification_in_another_folder_is_found(capsys: Captured) -> None:
+    Path("specs").mkdir()
+    Path("tilt.yaml").rename("specs/tilt.yaml")
+    assert "= did you mean 'specs/tilt.yaml'?" in faults(capsys, "check")
 
 
 def test_only_the_first_of_many_messages_are_answered(capsys: Captured) -> None:
@@ -183,6 +217,9 @@ def test_the_folder_above_a_project_names_the_way(capsys: Captured, monkeypatch:
         "error: which system? This folder has no specification of a system\n"
         "      = name a specification, or run 'cd tilt'\n"
     )
+    monkeypatch.chdir("tilt/rtl")
+    assert "or run 'cd ..'" in faults(capsys, "check")
+    monkeypatch.chdir("../..")
     assert faults(capsys, "check", "tilt/tlt.yaml") == (
         "error: cannot read tilt/tlt.yaml: No such file or directory\n      = did you mean 'tilt.yaml'?\n"
     )

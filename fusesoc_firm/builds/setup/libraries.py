@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.setup.outcome import configuration, configuration_file
-from fusesoc_firm.core.core_reader import read_core
-from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
+from fusesoc_firm.core.core_reader import core_name, read_core
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, closest
 from fusesoc_firm.text.outputs import shown
 from fusesoc_firm.tools.library_path import LINK, link_library
 
@@ -38,6 +38,11 @@ def open_libraries(config: Any = None) -> Any:
     _link_library(config)
     check_locations()
     return Fusesoc(config)
+
+
+def has_library(fusesoc: Any, folder: Path) -> bool:
+    """Return whether a folder is one of the libraries of a FuseSoC instance."""
+    return folder.resolve() in {Path(library.location).resolve() for library in fusesoc.get_libraries()}
 
 
 def check_locations() -> None:
@@ -191,8 +196,10 @@ def _unsatisfied(depend: Any, known: Sequence[str]) -> str:
 
 
 def _hint(fusesoc: Any, depend: Any, known: Sequence[str]) -> str:
-    versions = ", ".join(name.rpartition(":")[2] for name in known)
-    return f"known versions: {versions}" if known else ignored(fusesoc, _bare(depend))
+    if known:
+        return f"known versions: {', '.join(name.rpartition(':')[2] for name in known)}"
+    near = closest(_bare(depend), [core_name(name) for name in fusesoc.get_cores()])
+    return ignored(fusesoc, _bare(depend)) or (f"did you mean '{near}'?" if near else "")
 
 
 def _clashes(cores: Iterable[Any], flags: Mapping[str, Any]) -> Iterator[Diagnostic]:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fusesoc_firm.builds.setup.libraries import open_libraries
+from fusesoc_firm.builds.setup.libraries import has_library, open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.tools.library_path import library_root
 
@@ -47,9 +47,10 @@ def run_logged(build: Build, stages: Sequence[str], options: Sequence[str], tell
 
 def add_libraries(core: str, folder: Path | None) -> None:
     """Add our library and `folder` to FuseSoC's libraries, for this process and those that it starts, if missing."""
-    known = {name.rpartition(":")[0] for name in open_libraries().get_cores()}
+    fusesoc = open_libraries()
+    known = {name.rpartition(":")[0] for name in fusesoc.get_cores()}
     places = [library_root()] if _LIBRARY_CORE not in known else []
-    if folder and core.rpartition(":")[0] not in known and core not in known:
+    if folder and not has_library(fusesoc, folder) and core.rpartition(":")[0] not in known and core not in known:
         places.append(folder.resolve())
     if places:
         former = os.environ.get("FUSESOC_CORES")

@@ -15,6 +15,7 @@ from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
 from fusesoc_firm.builds.step.bench import SIMULATORS
+from fusesoc_firm.core.core_reader import core_name
 from fusesoc_firm.core.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, closest
 
@@ -216,9 +217,14 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
     try:
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
-        fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
+        cores = fusesoc.get_cores()
+        if versions := [name.rpartition(":")[2] for name in cores if core_name(name) == core.rpartition(":")[0]]:
+            faults.error(f"unknown version of core '{core}'", hint=f"known versions: {', '.join(versions)}")
+            return None
+        all_fitting = [name for name, item in cores.items() if {*targets} <= item.get_data({}).targets.keys()]
+        fitting = [name for name in all_fitting if name in _cores_here(fusesoc)] or all_fitting
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if targets and fitting else ""
-        short = {item.split(":")[2]: item.rpartition(":")[0] for item in fusesoc.get_cores()}
+        short = {item.split(":")[2]: item.rpartition(":")[0] for item in cores}
         near = closest(core.split(":")[2] if core.count(":") > 1 else core, short)
         meant = f"did you mean '{short[near]}'? " if near else ""
         hint = ignored(fusesoc, core) or meant + (listed or "'fusesoc core list' lists all cores")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.builds.setup.cores import calls_of, solved
-from fusesoc_firm.builds.setup.libraries import open_libraries
+from fusesoc_firm.builds.setup.libraries import has_library, open_libraries
 from fusesoc_firm.core.core_reader import core_name
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.library_path import library_root
@@ -78,7 +78,8 @@ def with_libraries(name: str, folder: Path) -> Any:
 
     fusesoc = open_libraries()
     for core, place in ((_LIBRARY_CORE, library_root()), (name, folder)):
-        if core.rpartition(":")[0] not in {known.rpartition(":")[0] for known in fusesoc.get_cores()}:
+        known = {item.rpartition(":")[0] for item in fusesoc.get_cores()}
+        if core.rpartition(":")[0] not in known and not has_library(fusesoc, place):
             fusesoc.add_library(Library(str(place), str(place.resolve())))
     return fusesoc
 
