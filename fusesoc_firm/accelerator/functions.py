@@ -154,7 +154,7 @@ class Functions:
         number = self.calls[block.block] = self.calls.get(block.block, -1) + 1
         when = f"message {number} to '{block.block}'"
         function, outputs = self.functions[block.block], block.type.outputs
-        with function.guarded(when):
+        with function.guarded(when, messages):
             answer: object = function.call(*deepcopy(messages))
         answers = [answer] if len(outputs) == 1 else [None] * len(outputs) if answer is None else answer
         if not isinstance(answers, list | tuple) or len(answers) != len(outputs):
@@ -179,7 +179,8 @@ def _answer(function: UserFunction, when: str, side: MessageSide, value: object)
     try:
         return decode(side.frame, encode_answer(side.frame, value))
     except CodecError as error:
-        function.fail(f"for {when}, {function.what} returned an invalid message: {error}", word=error.field)
+        fault = f"for {when}, {function.what} returned an invalid message: {error}"
+        function.fail(fault, error.hint, error.field)
 
 
 def _expected(outputs: Sequence[MessageSide]) -> str:

@@ -7,18 +7,20 @@ import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fusesoc_firm.text.diagnostics import SourceRef, closest, fail
+from fusesoc_firm.text.diagnostics import SourceRef, closest, fail, nearest
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 """A function in a user's text."""
 
 _MODULE = "_user_code"
+# Usual names of modules that are not the modules' own.
+_ABBREVIATIONS = {"np": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -30,12 +32,15 @@ class UserFunction:
     call: Callable[..., Any]
 
     @contextmanager
-    def guarded(self, when: str) -> Iterator[None]:
-        """Convert exceptions of the function within this context to `InputError`; `when` names the occasion."""
+    def guarded(self, when: str, messages: Sequence[Mapping[str, Any]] = ()) -> Iterator[None]:
+        """Convert exceptions of the function within this context to `InputError`.
+
+        `when` names the occasion, and `messages` are the function's arguments, whose fields are suggested.
+        """
         try:
             yield
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
-            _fail_in(self.path, self.what, error, f" for {when}", self._line())
+            _fail_in(place_in(self.path, self._line()), self.what, error, f" for {when}", [*_names(messages)])
 
     def fail(self, message: str, hint: str = "", word: str = "") -> NoReturn:
         """Raise `InputError` for a fault in the function's result.
@@ -76,7 +81,7 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
-        _fail_in(path, what, error, "")
+        _fail_in(place_in(path, 1), what, error, "")
     finally:
         sys.dont_write_bytecode = writes
     function = getattr(module, name, None)
@@ -92,8 +97,9 @@ def fail_missing(path: Path, function: str, what: str, hint: str) -> NoReturn:
     fail(f"there is no {what.removeprefix('the ')} at {path}", hint=f"did you mean '{near}'?" if near else form)
 
 
-def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
-    """Raise `InputError` at the line of the file that caused an exception, or at line `otherwise` if unknown."""
+def _fail_in(begin: SourceRef, what: str, error: BaseException, when: str, fields: Sequence[str] = ()) -> NoReturn:
+    """Raise `InputError` at the line that caused an exception in the file of `begin`, or at `begin` if unknown."""
+    path = Path(begin.file)
     text = f": {error}" if str(error) else ""
     message = f"{what} raised {type(error).__name__}{when}{text}"
     if isinstance(error, SyntaxError) and error.filename == str(path.absolute()):
@@ -103,9 +109,35 @@ def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: 
             SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
         )
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path.absolute())]
+    hint = _cure(error, fields)
     if not frames:
-        fail(message, place_in(path, otherwise))
-    fail(message, place_in(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
+        fail(message, begin, hint)
+    fail(message, place_in(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1), hint)
+
+
+def _cure(error: BaseException, fields: Sequence[str]) -> str:
+    """Return the cure of an exception that beginners cause, or an empty text; `fields` are those of the messages."""
+    match error:
+        case NameError(name=str(name)):
+            module = _ABBREVIATIONS.get(name, name)
+            if importlib.util.find_spec(module) is None:
+                return ""
+            return f"write 'import {module}{f' as {name}' if name != module else ''}' at the top of the file"
+        case AttributeError(name=str(name), obj=dict()):
+            return f'a message is a dict: write message["{name}"]'
+        case KeyError(args=[str(key)]) if fields:
+            return nearest(key, fields)
+        case ModuleNotFoundError(name=str(name)):
+            return f"install '{name}' with pip"
+    return ""
+
+
+def _names(value: object) -> Iterator[str]:
+    """Yield the names of all fields in messages."""
+    if isinstance(value, Mapping):
+        yield from value
+    for part in value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ():
+        yield from _names(part)
 
 
 def _own_nodes(path: Path, line: int) -> Iterator[ast.expr | ast.stmt]:

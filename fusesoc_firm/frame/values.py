@@ -22,6 +22,13 @@ _repr = Repr()
 _repr.maxstring = _repr.maxother = _repr.maxlong = 60
 
 
+_LEGAL = {
+    "bool": "legal here: True, False",
+    **dict.fromkeys(("float32", "float64"), "legal here: numbers"),
+    **dict.fromkeys(("string", "wstring"), "legal here: texts (str)"),
+}
+
+
 class CodecError(ValueError):
     """A value that does not fit its message, or bytes that do not fit their frame."""
 
@@ -30,6 +37,19 @@ class CodecError(ValueError):
         """The last name of the field in the text, or "" if the text names none."""
         found = re.search(r"'(?:[^' ]+\.)?(\w+)'", str(self))
         return found[1] if found else ""
+
+    @property
+    def hint(self) -> str:
+        """The legal values, if the text names a field and its type, or an empty text."""
+        if " must be a mapping of fields" in str(self):
+            return "legal here: a mapping, such as {'x': 1.0, 'y': 2.0}"
+        found = re.search(r"must be of type (\w+),", str(self))
+        name = found[1] if found else ""
+        if bits := re.fullmatch(r"(u?)int(\d+)", name):
+            is_signed, size = not bits[1], int(bits[2])
+            least, most = (-(2 ** (size - 1)), 2 ** (size - 1) - 1) if is_signed else (0, 2**size - 1)
+            return f"legal here: integers from {least} to {most}"
+        return _LEGAL.get(name, "")
 
 
 class SignallingNan(float):

@@ -88,11 +88,11 @@ class _Answers:
         if not takes(self.function.args, len(PARAMETERS)):
             own = f"{NAME}({ast.unparse(self.function.args)})"
             self._note(f"'{NAME}' is called as '{_FORM}', but is defined as '{own}'", self.function)
-        for value in self._values():
-            if isinstance(value, ast.Dict) or (isinstance(value, ast.Constant) and not isinstance(value.value, str)):
-                self._note(f"'{NAME}' returns {ast.unparse(value)}, which is not a list", value, ANSWER)
-            for item in _items(value):
-                self._check_item(item)
+        values = [*self._values()]
+        if not values and not any(isinstance(node, ast.Raise) for node in nodes_of(self.function)):
+            self._note(f"'{NAME}' returns nothing", self.function, ANSWER)
+        for value in values:
+            self._check_value(value)
 
     def _values(self) -> Iterator[ast.expr]:
         """Yield the values that the function returns, and lists with the values that it yields."""
@@ -102,6 +102,16 @@ class _Answers:
                     yield value
                 case ast.Yield(value=ast.expr() as value):
                     yield ast.List([value], ast.Load())
+
+    def _check_value(self, value: ast.expr) -> None:
+        match value:
+            case ast.Tuple(elts=[ast.Constant(value=str()), _]):
+                self._note(f"'{NAME}' returns one response, not a list", value, f"write [{ast.unparse(value)}]")
+                return
+            case ast.Dict() | ast.Constant(value=int() | float() | None):
+                self._note(f"'{NAME}' returns {ast.unparse(value)}, which is not a list", value, ANSWER)
+        for item in _items(value):
+            self._check_item(item)
 
     def _check_item(self, item: ast.expr) -> None:
         match item:

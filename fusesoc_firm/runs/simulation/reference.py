@@ -75,7 +75,7 @@ class _Model:
 
     def answer(self, stimulus: Stimulus, when: str) -> list[object]:
         """Return the result of `respond` as a list."""
-        with self.respond.guarded(when):
+        with self.respond.guarded(when, [stimulus.message]):
             # A copy, because reports show the original message.
             answer: object = self.respond.call(stimulus.subscriber.block, deepcopy(stimulus.message))
             # If `respond` is a generator, the user's code runs only here.
@@ -104,5 +104,5 @@ class _Model:
             payload = encode_answer(publisher.frame, message)
         except CodecError as error:
             fault = f"for {when}, 'respond' returned an invalid message for '{block}': {error}"
-            self.respond.fail(fault, word=error.field)
+            self.respond.fail(fault, error.hint, error.field)
         return Response(publisher, payload, decode(publisher.frame, payload), cause)

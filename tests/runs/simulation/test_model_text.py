@@ -57,10 +57,11 @@ def faults(folder: Path, text: str) -> str:
             "def respond(b, m):\n    return {'left': m}\n",
             "2:12: error: 'respond' returns {'left': m}",
         ),
+        ("def respond(b, m):\n    answer = [('left', m)]\n", "1:1: error: 'respond' returns nothing"),
         ("def respond(b, m):\n    return None\n", "2:12: error: 'respond' returns None"),
         (
             "def respond(b, m):\n    return 'left', m\n",
-            "2:12: error: 'respond' returns a list that",
+            "2:12: error: 'respond' returns one response, not a list",
         ),
         (
             "def respond(b, m):\n    return [('left', {'x': 1, 'v': 2})]\n",
@@ -78,6 +79,11 @@ def test_a_fault_in_the_text_has_its_place(tmp_path: Path, text: str, message: s
     assert found.count("error: ") == 1
 
 
+def test_one_response_becomes_a_list_of_one(tmp_path: Path) -> None:
+    found = faults(tmp_path, "def respond(b, m):\n    return ('left', {'x': 1.0})\n")
+    assert found.endswith("= write [('left', {'x': 1.0})]")
+
+
 def test_a_hint_contains_only_names_that_a_user_wrote(tmp_path: Path) -> None:
     assert "= legal here: left" in faults(tmp_path, "def respond(b, m):\n    return [('sub', m)]\n")
     assert faults(tmp_path, "def respond(b, m):\n    return [('right', m)]\n") == ""
@@ -86,6 +92,7 @@ def test_a_hint_contains_only_names_that_a_user_wrote(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
+        "def respond(b, m):\n    raise NotImplementedError\n",
         "def respond(b, m):\n    answer = {'x': 1}\n    answer['y'] = answer['z']\n    return [('left', answer)]\n",
         "def respond(b, m):\n    answer = {'x': 1}\n    fill(answer)\n    return [('left', answer)]\n",
         "def respond(block, m):\n    return [('left', {**m, 'x': 1})]\n",

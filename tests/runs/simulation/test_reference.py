@@ -80,6 +80,30 @@ def test_a_model_may_keep_state_and_change_what_it_gets(tmp_path: Path) -> None:
     assert [item.message["x"] for item in sent] == [1.0, 2.0]
 
 
+@pytest.mark.parametrize(
+    ("value", "hint"),
+    [
+        ("m.x", 'a message is a dict: write message["x"]'),
+        ("m['xx']", "did you mean 'x'?"),
+        ("np.cos(m['x'])", "write 'import numpy as np' at the top of the file"),
+        ("math.cos(m['x'])", "write 'import math' at the top of the file"),
+        ("str(m['x'])", "legal here: numbers"),
+    ],
+)
+def test_a_usual_mistake_has_a_cure(tmp_path: Path, value: str, hint: str) -> None:
+    with pytest.raises(InputError) as caught:
+        ask(tmp_path, f"def respond(block, m):\n    return [('left', {{'x': {value}}})]\n")
+    (fault,) = caught.value.diagnostics
+    assert fault.hint == hint
+    assert fault.source
+    assert fault.source.line == 2
+
+
+def test_an_unusual_mistake_has_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"name 'gain_of_nothing' is not defined\n.*\n *[|] *\^$"):
+        ask(tmp_path, "def respond(block, m):\n    return gain_of_nothing\n")
+
+
 def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
     before = sys.dont_write_bytecode
     ask(tmp_path, "def respond(block, m):\n    return []\n")
