@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import difflib
 import itertools
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -23,6 +24,7 @@ from fusesoc_firm.message.idl.parser import parse_idl
 from fusesoc_firm.message.joint import INTERFACES, Language
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware, known_suffixes, middlewares
 from fusesoc_firm.message.model import InterfaceKind, MessageName, nested_message
+from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.services import EVENT_INFO, Interface
 from fusesoc_firm.message.unsupported import unsupported_word
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from fusesoc_firm.message.bag_reader import BagDefinitions
 
 # The hint about additional sources.
-_FURTHER = "; add places with 'paths' in the specification or core, or with --path"
+_FURTHER = "; source its ROS workspace, or add its folder with 'paths' in the specification or core, or with --path"
 # The number of unknown messages for which a similar name is searched, which takes tens of milliseconds each.
 _MOST_SEARCHED = 20
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
@@ -341,8 +343,22 @@ class MessageLibrary:
             return str(same_type[0])
         builtin_types = sorted(self.ros.builtin_types)
         primitives = difflib.get_close_matches(name.name, builtin_types, n=1, cutoff=0.8)
-        names = [str(known) for known in (*self.names(), *(interface.name for interface in self._interfaces))]
-        return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
+        known = [*self.names(), *(interface.name for interface in self._interfaces)]
+        # Two names of packages are always similar.
+        types = difflib.get_close_matches(name.name, {item.name for item in known}, n=1, cutoff=0.7)
+        names = [str(item) for item in known if item.name in types]
+        return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1, cutoff=0)), "")
+
+    def parse(self, text: str) -> MessageName:
+        """Parse a name like `parse_name`; the hint about an invalid one contains the nearest known message."""
+        try:
+            return parse_name(text)
+        except InputError as error:
+            words = [word.lower() for word in re.findall(r"\w+", text)]
+            known = [item for item in self.names() if item.name.lower() in words[-1:]]
+            near = next((item for item in known if item.package in words), next(iter(known), None))
+            fault = error.diagnostics[0]
+            fail(fault.message, hint=f"did you mean '{near}'?" if near else fault.hint)
 
 
 class Libraries(Mapping[Middleware, MessageLibrary]):

@@ -213,6 +213,16 @@ def _control_characters(text: str, file: str) -> Iterator[tuple[str, SourceRef]]
                 yield found[0], SourceRef(file, number, found.start() + 1, shown)
 
 
+_WITHOUT_BLANK = re.compile(r"[\s-]*\w+:[^\s/]")
+# What PyYAML was reading at a fault, and the probable cure.
+_CURES = {
+    "while scanning a simple key": "write 'key: value', with a blank after the colon",
+    "while scanning a quoted scalar": "close the quotation mark",
+    "while parsing a flow sequence": "close the list with ']', or separate its items with ','",
+    "while parsing a flow mapping": "close the mapping with '}', or separate its items with ','",
+}
+
+
 def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...], faults: Diagnostics) -> None:
     problem = error.problem or error.context or "syntax error"
     context = error.context_mark
@@ -225,14 +235,18 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
     if "'\\t'" in problem:
         hint = "indent YAML with blanks, not with tabs"
     elif error.context and context is not None:
-        hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
+        begin = f"{file}:{context.line + 1}:{context.column + 1}"
+        cure = _CURES.get(error.context)
+        hint = f"{cure}; it begins at {begin}" if cure else f"{error.context}, which begins at {begin}"
     elif error.context and is_late:
-        hint = error.context
+        hint = _CURES.get(error.context, error.context)
     line, column = len(lines) - 1, max(0, len(lines[-1]) - 1)
     if mark is not None and mark.line < len(lines):
         line, column = mark.line, mark.column
         if problem.startswith(_INDENTATION_PROBLEMS):
             hint = _indentation_hint(lines, line) or hint
+            if not hint and line and _WITHOUT_BLANK.match(lines[line - 1]):
+                hint = f"write a blank after the colon in line {line}"
     faults.error(f"invalid YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
 
 

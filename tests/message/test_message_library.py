@@ -212,8 +212,32 @@ def test_an_unknown_message_is_reported_where_it_is_named() -> None:
     assert str(caught.value).splitlines()[0] == "spec.yaml:3:12: error: unknown message 'geometry_msgs/Quaternoin'"
     assert str(caught.value).splitlines()[-1] == (
         "      = did you mean 'geometry_msgs/Quaternion'? looked in: rosbags ros1_noetic; "
-        "add places with 'paths' in the specification or core, or with --path"
+        "source its ROS workspace, or add its folder with 'paths' in the specification or core, or with --path"
     )
+
+
+def test_a_message_of_an_unknown_package_is_not_taken_for_another_type() -> None:
+    """The packages are similar, as all names of packages are: my_msgs/Foo is not std_msgs/Bool."""
+    for name in (MessageName("my_msgs", "Foo"), MessageName("ackermann_msgs", "AckermannDrive")):
+        with pytest.raises(InputError) as caught:
+            MessageLibrary(ROS2).get(name)
+        assert caught.value.diagnostics[0].hint.startswith("looked in: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("Imu", "did you mean 'sensor_msgs/Imu'?"),
+        ("geometry_msgs.msg.Point", "did you mean 'geometry_msgs/Point'?"),
+        ("geometry_msgs::msg::point", "did you mean 'geometry_msgs/Point'?"),
+        ("Foo", "write 'package/Type', such as 'geometry_msgs/Quaternion'"),
+    ],
+)
+def test_a_text_that_is_no_name_gets_the_message_with_its_last_word(text: str, hint: str) -> None:
+    with pytest.raises(InputError) as caught:
+        MessageLibrary(ROS2).parse(text)
+    assert caught.value.diagnostics[0].message == f"'{text}' is not a message name"
+    assert caught.value.diagnostics[0].hint == hint
 
 
 def test_a_closure_holds_each_message_behind_what_it_is_made_of(tmp_path: Path) -> None:

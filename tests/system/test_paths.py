@@ -95,7 +95,10 @@ def test_the_order_is_that_of_a_build(project: Project, capsys: Captured) -> Non
     project.write(parameters=", paths: [core]")
     shutil.copy(project.spec, project.root / "other.yaml")
     assert main(["system", "check", str(project.root / "other.yaml")]) == 1
-    assert "add places with 'paths' in the specification or core, or with --path" in capsys.readouterr().err
+    assert (
+        "source its ROS workspace, or add its folder with 'paths' in the specification or core, or with --path"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("kind", ["folder", "sqlite3", "mcap"])

@@ -118,9 +118,25 @@ def test_what_is_no_yaml_is_shown_where_it_begins(text: str, faults: list[str]) 
     assert [line for line in found.splitlines() if ": error: " in line] == faults
 
 
+@pytest.mark.parametrize(
+    ("text", "cure"),
+    [
+        ("a: [b, c\nd: e\n", "close the list with ']'"),
+        ("a: 'b\nc: d\n", "close the quotation mark"),
+        ("a:\n  d: e\n  b:c\n", "write 'key: value', with a blank after the colon"),
+        ("a:\n  b:c\n  d: e\n", "write a blank after the colon in line 2"),
+    ],
+)
+def test_what_the_parser_was_reading_selects_the_cure(text: str, cure: str) -> None:
+    _, fault = parse(text)
+    assert cure in fault.splitlines()[-1]
+
+
 def test_the_bracket_that_is_open_is_named() -> None:
     _, fault = parse("a: {b: c\nd:\n  - e\n")
-    assert fault.splitlines()[-1] == "      = while parsing a flow mapping, which begins at a.yaml:1:4"
+    assert fault.splitlines()[-1] == (
+        "      = close the mapping with '}', or separate its items with ','; it begins at a.yaml:1:4"
+    )
 
 
 @pytest.mark.parametrize(

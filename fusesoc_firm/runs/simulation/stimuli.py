@@ -10,6 +10,7 @@ Fields may be omitted; they are sent with their defaults, or as zero or empty, a
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -23,7 +24,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.runs.simulation.yaml_message import read_message
 from fusesoc_firm.system.derived.model import DerivedSystem, Topic
-from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest, fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, closest, fail, nearest
 from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
@@ -56,7 +57,7 @@ def read_stimuli(
     items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
     legal = f"a bag, or a YAML file with a list of messages: {items}"
     if not path.exists():
-        near = closest(path.name, [item.name for item in path.parent.glob("*")])
+        near = closest(path.name, [item.name for item in path.parent.glob("*") if _may_be_stimuli(item)])
         fail(f"the stimuli {path} do not exist", hint=f"did you mean '{near}'?" if near else f"legal here: {legal}")
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
@@ -73,6 +74,13 @@ def read_stimuli(
         place = SourceRef(str(path), 1, 1) if path.suffix in _YAML_SUFFIXES else None
         fail(f"{path} contains no message for {names}", place, f"legal here: {legal}")
     return stimuli
+
+
+def _may_be_stimuli(path: Path) -> bool:
+    """Return whether a file is a bag or contains a list; other files, such as specifications, are not suggested."""
+    with suppress(InputError):
+        return path.suffix not in _YAML_SUFFIXES or isinstance(read_yaml(path, bounds=LARGE).root, yaml.SequenceNode)
+    return False
 
 
 def _recorded(path: Path, subscriber: Topic, payload: bytes, message: dict[str, Any]) -> Stimulus:

@@ -16,7 +16,6 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived.bypass import with_bypass
 from fusesoc_firm.system.derived.connections import Wiring, places
 from fusesoc_firm.system.derived.cpp_function import check_kernel
@@ -210,7 +209,7 @@ class _Resolver:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
         try:
-            name = parse_name(message)
+            name = library.parse(message)
             library.get(name, message.source)
             key = library.ros, name
             if key not in self.frames:

@@ -254,7 +254,7 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
 
 
 def _frame(name: str, ros: Middleware, known: Libraries) -> Frame:
-    message = parse_name(name)
+    message = known[ros].parse(name)
     return frame_of(message, known[ros].closure(message))
 
 
