@@ -25,7 +25,7 @@ from typing import Protocol
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.frame.content import without_tail
-from fusesoc_firm.frame.faults import told
+from fusesoc_firm.frame.faults import Fault, told
 from fusesoc_firm.node.actions.actions import NodeActions
 from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.engine.calls import NodeCalls
@@ -151,6 +151,8 @@ class Node:
         self._calls = NodeCalls(description.services, self._put_service_message, self._report, self._start)
         self._actions = NodeActions(description, self._put_service_message, self._report, self._start)
         self.statistics = Statistics.of(description, self._calls.counts, self._actions.counts)
+        # The bytes of the longest message for each input.
+        self._longest: dict[str, int] = {}
         self._description = description
         self._open_transport = open_transport
         self._settings = settings
@@ -421,6 +423,7 @@ class Node:
     def _handle(self, number: int, message: _Message) -> bool:
         """Pass a message on to the hardware and to software; return False if the hardware has failed permanently."""
         item = self._inputs[number]
+        self._longest[item.block] = max(self._longest.get(item.block, 0), len(message.payload))
         with self._sending:
             if item.id is not None and not self._send_frame(item.id, message):
                 return False
@@ -592,7 +595,8 @@ class Node:
         if converter is not None and converter in self._subscriber_names:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
-            self._report(f"the hardware rejected a message from '{block}': {told(code)}")
+            size = f": the longest message had {self._longest.get(block, 0)} bytes" if code == Fault.TOO_LONG else ""
+            self._report(f"the hardware rejected a message from '{block}': {told(code)}{size}")
             self._refuse(block, "the hardware rejected the request")
             if self._trace:
                 self._trace.refused(converter)

@@ -291,14 +291,15 @@ def test_garbage_from_the_hardware_is_reported_and_the_rest_goes_on(tmp_path: Pa
 
 def test_a_message_that_the_hardware_refuses_is_counted(tmp_path: Path) -> None:
     bench = Bench()
-    run = Run(describe(pairs(tmp_path)), bench.open)
+    run = Run(describe(pairs(tmp_path)), bench.open, NodeSettings(depth=100))
+    run.carrier.give(1, *POINTS)
+    run.stop()
     for converter_, code in ((1, 7), (1, 0), (None, 0)):
         run.node.refused(converter_, code)
-    run.stop()
     assert (run.node.statistics.inputs["a1"].refused, run.node.statistics.faults) == (2, 1)
-    said = "the hardware rejected a message from 'a1': "
+    said, size = "the hardware rejected a message from 'a1': ", f": the longest message had {len(POINTS[0])} bytes"
     assert run.reports[:2] == [
-        f"{said}the payload is longer than maxLength (code 7); give the block a larger 'maxLength'",
+        f"{said}the payload is longer than maxLength (code 7); give the block a larger 'maxLength'{size}",
         f"{said}it is malformed, or longer than 'maxLength'",
     ]
 
