@@ -105,7 +105,8 @@ def _build(arguments: argparse.Namespace) -> None:
         if status or bitstream is None:
             answer["output"] = [*error_lines(chosen.build, folder, loaded)]
             _print_failure(arguments, answer["output"], figures)
-            fail(f"there is no bitstream for {chosen.board}", hint=f"the whole output: {log}")
+            cure = "; register stages in the accelerator shorten its longest path" if figures.is_too_slow else ""
+            fail(f"there is no bitstream for {chosen.board}", hint=f"the whole output: {log}{cure}")
         answer.update(bitstream=shown(bitstream), next=f"firm load {_words(arguments.system, chosen.board)}")
     if not (arguments.quiet or arguments.json):
         print(f"bitstream: {answer['bitstream']}", *figures.lines(), f"log:       {log}", sep="\n")

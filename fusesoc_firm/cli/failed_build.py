@@ -19,7 +19,7 @@ _ERROR = re.compile(r"(?:\b|:)error\b|\(assertion failure\)|^Traceback|^\S+:\d+:
 # Lines of FuseSoC, Edalize and make around the message of the tool that failed.
 _NOISE = re.compile(
     r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed|.* exited with an error)|far: "
-    r"|(Entering|Leaving) directory |\S+ -m fusesoc_firm\.cli tool "
+    r"|Info: |(Entering|Leaving) directory |\S+ -m fusesoc_firm\.cli tool "
 )
 # A place in a file that FuseSoC copied into the build folder.
 _COPY = re.compile(r"(?<!\S)src/[^/\s]+/(?P<path>[^\s:]+):(?P<line>\d+)\b")

@@ -37,6 +37,7 @@ from fusesoc_firm.system.boards.board import (
     board_entity,
     board_path,
     check_fits,
+    clock_of,
     on_board,
     read_board,
 )
@@ -199,6 +200,9 @@ def load_requested(request: Request) -> LoadedSystem:
         changed=lambda written: with_keys(on_board(written, board) if board else written, given),
         core_folders=request.message_folders.of,
     )
+    if board and board.is_linked and loaded.system.clock != clock_of(board):
+        message = f"clk of board '{board.name}' has {board.clock}, not {given['clock']}"
+        fail(message, request.place("clock"), "remove the parameter 'clock'; a pin or a PLL of the board sets it")
     return replace(loaded, board=board)
 
 

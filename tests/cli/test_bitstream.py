@@ -12,6 +12,7 @@ import pytest
 
 from fusesoc_firm.builds.setup.outcome import Build
 from fusesoc_firm.cli import main
+from fusesoc_firm.system.boards.board import boards, read_board
 from fusesoc_firm.tools.programs import missing
 from tests.cli.tilt import begin_tilt
 
@@ -120,6 +121,35 @@ def test_a_failure_is_a_line_of_json(capsys: Captured) -> None:
     Path("tilt.yaml").write_text(Path("tilt.yaml").read_text().replace("project:\n", "project:\n  widht: 8\n"))
     fault = lines_of_json(capsys, 1, "bitstream", "--board", "ulx3s")[-1]["faults"][0]
     assert (fault["file"], fault["line"], fault["message"]) == ("tilt.yaml", 3, "'project' has no key 'widht'")
+
+
+def test_a_clock_that_is_not_reached_has_a_cure(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(build: Build, _stages: object, _options: object, _tell: object) -> int:
+        build.log.parent.mkdir(parents=True, exist_ok=True)
+        build.log.write_text(
+            "ERROR: Max frequency for clock 'clk': 20.00 MHz (FAIL at 25.00 MHz)\nInfo: Slack histogram:\n"
+        )
+        BITSTREAM.parent.mkdir(parents=True)
+        fmax = {"fmax": {"clk": {"achieved": 20.0, "constraint": 25}}}
+        BITSTREAM.with_name("report.json").write_text(json.dumps(REPORT | fmax))
+        return 1
+
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.missing", lambda _: [])
+    monkeypatch.setattr("fusesoc_firm.builds.setup.bitstream.run_logged", run)
+    assert main(["bitstream", "--board", "ulx3s", "--quiet"]) == 1
+    captured = capsys.readouterr()
+    assert captured.out.startswith("clock:     20.0 MHz reached, 25.0 MHz needed\n")
+    assert captured.err == (
+        "ERROR: Max frequency for clock 'clk': 20.00 MHz (FAIL at 25.00 MHz)\n"
+        "error: there is no bitstream for ulx3s\n"
+        "      = the whole output: build/robot_sys_tilt_0.1.0/ulx3s.log; "
+        "register stages in the accelerator shorten its longest path\n"
+    )
+
+
+def test_open_tools_build_for_boards_that_can_be_loaded() -> None:
+    found = [read_board(name) for name in boards()]
+    assert all(board.loader for board in found if board.flow in ("apicula", "icestorm", "trellis"))
 
 
 @pytest.mark.usefixtures("tools")

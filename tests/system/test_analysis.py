@@ -216,6 +216,21 @@ def test_a_distribution_is_meant_for_its_own_version(tmp_path: Path, distro: str
     assert len(load_requested(request).system.publishers) == 2
 
 
+def test_the_clock_of_a_board_is_that_of_its_pin(tmp_path: Path) -> None:
+    """A call with another clock would give the times and the UART another frequency than the board has."""
+    read(tmp_path, specification(converter("s", "subscriber", "Point", "p") + converter("p", "publisher", "Point")))
+    for clock in (None, "12 MHz", "0.012 GHz"):
+        parameters = {"spec": "spec.yaml", "paths": None, "board": "icebreaker", "clock": clock}
+        loaded = load_requested(Request("far", "a:b:c-d:0", tmp_path, parameters))
+        assert loaded.system.clock == 12_000_000
+    with pytest.raises(InputError) as raised:
+        load_requested(Request("far", "a:b:c-d:0", tmp_path, {**parameters, "clock": "400 MHz"}))
+    assert str(raised.value) == (
+        "error: clk of board 'icebreaker' has 12 MHz, not 400 MHz\n"
+        "      = remove the parameter 'clock'; a pin or a PLL of the board sets it"
+    )
+
+
 def test_an_unknown_distribution(tmp_path: Path) -> None:
     read(tmp_path, specification(converter("s", "subscriber", "Point", "p") + converter("p", "publisher", "Point")))
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": "melodious"})

@@ -82,6 +82,11 @@ class Figures:
     clocks: tuple[Clock, ...] = ()
     area: tuple[Use, ...] = ()
 
+    @property
+    def is_too_slow(self) -> bool:
+        """Whether the system does not reach one of the clocks."""
+        return any(item.reached < item.needed for item in self.clocks)
+
     def lines(self) -> list[str]:
         """Return the figures as lines of a report."""
         found = [f"clock:     {item.reached:.1f} MHz reached, {item.needed:.1f} MHz needed" for item in self.clocks]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -303,6 +304,11 @@ def on_board(specification: Specification, board: Board) -> Specification:
     if board.phy and project.network:
         project = replace(project, network=replace(project.network, phy=board.phy))
     return replace(specification, project=project)
+
+
+def clock_of(board: Board) -> Fraction | None:
+    """Return the frequency of clk in Hz that a board file names; None if it is illegal."""
+    return frequency("clock", board.clock, Diagnostics())
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
