@@ -63,6 +63,7 @@ def add_init(commands: Any) -> None:
     init.add_argument("--ros", choices=("1", "2"), help="the ROS version (default: 2)")
     init.add_argument(
         "--language",
+        type=_language,
         choices=("vhdl", "verilog", "hls", "python"),
         help="the accelerator's language; hls is C++, which AMD Vitis HLS builds and g++ simulates; python runs on the "
         "host, behind hardware (default: vhdl)",
@@ -97,6 +98,11 @@ def add_init(commands: Any) -> None:
         help="ask for further accelerators and blocks of an existing specification, whose comments remain",
     )
     add_sources(init)
+
+
+def _language(text: str) -> str:
+    """Return a language as this command names it: in lower case, and C++ by its tool."""
+    return "hls" if text.lower() in ("c++", "cpp") else text.lower()
 
 
 def _init(arguments: argparse.Namespace) -> None:

@@ -145,6 +145,10 @@ def test_help_describes_every_command(capsys: Captured) -> None:
         (["valdate"], "did you mean 'firm check'?"),
         (["synth"], "did you mean 'firm bitstream'?"),
         (["flash"], "did you mean 'firm load --flash'?"),
+        (["boards"], "did you mean 'firm bitstream'?"),
+        (["generate"], "did you mean 'firm system core SPEC'?"),
+        (["deploy"], "did you mean 'firm load'?"),
+        (["node"], "did you mean 'firm system node' or 'firm live'?"),
         (["waves"], "did you mean 'firm sim --waves'?"),
         (["VERIFY"], "did you mean 'firm message verify' or 'firm cache verify' or 'firm check'?"),
         (["skeleton", "robot.yaml"], "did you mean 'firm system skeleton'?"),
@@ -442,6 +446,15 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
     assert '"block sub" -> "block pub"' in picture.read_text(encoding="utf-8")
     assert out(capsys, "system", "diagram", str(spec), "--format", "dot") == picture.read_text(encoding="utf-8")
     assert "generated for each line written" in out(capsys, "system", "report", str(spec))
+
+
+@pytest.mark.parametrize(("language", "source"), [("Verilog", "rtl/robot.v"), ("C++", "hls/robot.cpp")])
+def test_a_language_may_have_its_usual_spelling(
+    language: str, source: str, capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ("init", "robot", "--in", "std_msgs/Int8", "--out", "std_msgs/Int8", "--language", language)
+    assert f"robot/{source}\n" in out(capsys, *words)
 
 
 def test_init_extends_a_system(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

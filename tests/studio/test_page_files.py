@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from fusesoc_firm.studio import page_files
 
+ROOT = Path(__file__).resolve().parents[2]
 NPM = '#!/bin/sh\necho "$@" >> calls\n{}\n'
 BUILDS = 'if [ "$1" = run ]; then mkdir -p ../static; touch -d "+1 minute" ../static/index.html; fi'
 
@@ -85,3 +87,20 @@ def test_an_installation_has_no_sources(room: Path, monkeypatch: pytest.MonkeyPa
     assert told == [
         "the page is not built, so the browser shows none: install a wheel that was built after 'make studio'"
     ]
+
+
+@pytest.mark.parametrize("command", ["bdist_wheel", "egg_info"])
+def test_a_wheel_without_the_page_is_built_with_a_warning(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("setup.py", "README.md"):
+        shutil.copy(ROOT / name, tmp_path)
+    monkeypatch.setattr("setuptools.setup", lambda **_: None)
+    monkeypatch.setattr(sys, "argv", ["setup.py", command])
+    runpy.run_path(str(tmp_path / "setup.py"))
+    assert ("'make studio' builds the page first" in capsys.readouterr().err) == (command == "bdist_wheel")
+    page = tmp_path / "fusesoc_firm" / "studio" / "static" / "index.html"
+    page.parent.mkdir(parents=True)
+    page.touch()
+    runpy.run_path(str(tmp_path / "setup.py"))
+    assert capsys.readouterr().err == ""
