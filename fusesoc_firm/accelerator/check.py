@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fusesoc_firm.accelerator.cpp import read_function
+from fusesoc_firm.accelerator.cpp import lacks_function, read_function
 from fusesoc_firm.accelerator.cpp_interface import compare_function
 from fusesoc_firm.accelerator.instances import Instances
 from fusesoc_firm.accelerator.interface import compare
@@ -16,7 +16,7 @@ from fusesoc_firm.accelerator.unit import Libraries, Reader
 from fusesoc_firm.accelerator.verilog import VerilogReader
 from fusesoc_firm.accelerator.vhdl import VhdlReader
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
-from fusesoc_firm.system.derived.cpp_function import function_name
+from fusesoc_firm.system.derived.cpp_function import function_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.system_core import LoadedSystem, artifacts
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics
@@ -50,8 +50,11 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
                 names = ", ".join(str(type_.accelerator.name) for type_ in types)
                 faults.warn(f"not read, since {program} is not installed: {names}", hint=ways(program))
     for type_ in _written_in("HLS", loaded):
-        if function := read_function(loaded.folder / type_.accelerator.sources[0], function_name(type_)):
+        sources, name = type_.accelerator.sources, function_name(type_)
+        if function := read_function(loaded.folder / sources[0], name):
             compare_function(type_, function, faults)
+        elif all(lacks_function(path, name) for path in _sources(type_, loaded.folder)):
+            faults.error(f"'{sources[0]}' has no function '{name}'", sources[0].source, f"expected: {prototype(type_)}")
     _without_consequences(faults).raise_if_any()
     return faults.warnings
 

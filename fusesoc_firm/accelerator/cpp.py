@@ -93,6 +93,11 @@ def read_function(path: Path, name: str) -> CppFunction | None:
     return _File(path).function(name)
 
 
+def lacks_function(path: Path, name: str) -> bool:
+    """Return whether a file certainly defines no function `name`: it names none, and includes no file of its own."""
+    return _File(path).lacks(name)
+
+
 class _File:
     """The tokens of a C++ file, without blanks and comments."""
 
@@ -119,6 +124,13 @@ class _File:
         pragmas = tuple(pragma for token in body if (pragma := self._pragma(token)))
         place = self._place(self._tokens[start].start, len(name))
         return CppFunction(name, place, known, pragmas, self._words(body))
+
+    def lacks(self, name: str) -> bool:
+        """Return whether no word is `name`; a macro or an included file could make one of other words."""
+        directives = [token.text for token in self._tokens if token.kind == "directive"]
+        if any("##" in text or re.match(r'#\s*include\s*"', text) or name in text for text in directives):
+            return False
+        return all(token.text != name for token in self._tokens)
 
     def _definitions(self, name: str) -> Iterator[tuple[int, int]]:
         """Yield the indices of the function's name and of the parenthesis that closes its parameters."""

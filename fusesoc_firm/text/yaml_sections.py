@@ -172,7 +172,9 @@ class _Reader:
 
     def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{name}' must be a list with one '- ' per item, not {kind(node)}", node, entry.meaning)
+            required = [key for key, (_, item) in keys_of(_section_type(entry)).items() if item.is_required]
+            form = f": write [{{{required[0]}: {node.value}}}]" if len(required) == 1 and _is_word(node) else ""
+            self._error(f"'{name}' must be a list with one '- ' per item, not {kind(node)}", node, entry.meaning + form)
             return None
         if not node.value and entry.is_required:
             self._error(f"'{name}' is an empty list", node, entry.meaning)
@@ -205,6 +207,10 @@ class _Reader:
 
     def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
         self.faults.error(message, self.file.source(node), hint)
+
+
+def _is_word(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and not is_null(node)
 
 
 def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:

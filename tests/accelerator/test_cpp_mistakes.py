@@ -53,7 +53,8 @@ LEGAL = [
     ("void acc(double pose_position_x_in", "#define REAL(name) double name\nvoid acc(REAL(pose_x_in)"),
     ("void acc(double pose_position_x_in", "#define X_IN double pose_x_in\nvoid acc(X_IN"),
     ("void acc(double pose_position_x_in", "void acc(\n#include <x.h>\n"),
-    ("void acc(", "void other("),
+    ("void acc(", '#include "acc.h"\nvoid other('),
+    ("void acc(", "#define NAME(a) a##cc\nvoid NAME(a)("),
     ("void acc(double pose_position_x_in", "void acc(const pose_position_x_in"),
     ("void acc(double pose_position_x_in", "void acc(, double pose_position_x_in"),
 ]
@@ -119,6 +120,13 @@ def test_nothing_is_said(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert edited(messages, old, new) == []
+
+
+def test_a_function_of_another_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (fault,) = edited(VALUES, "void acc(", "void accc(")
+    assert str(fault).startswith("acc/acc.yaml:7:14: error: 'hls/acc.cpp' has no function 'acc'\n")
+    assert fault.hint.startswith("expected: void acc(double pose_position_x_in, double pose_position_y_in,")
 
 
 @pytest.mark.parametrize("language", ["hls", "vhdl"])

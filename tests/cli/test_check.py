@@ -159,7 +159,9 @@ def test_only_the_first_of_many_messages_are_answered(capsys: Captured) -> None:
 def test_the_functions_of_software_are_read(capsys: Captured) -> None:
     edit("tilt.yaml", "type: VHDL\n    sources: rtl/tilt.vhd", "type: ROS-SW\n    sources: tilt.py")
     Path("tilt.py").write_text("def tlit(message):\n    return message\n")
-    assert "error: 'tilt.py' has no function 'tilt'" in faults(capsys, "check")
+    found = faults(capsys, "check")
+    assert "error: 'tilt.py' has no function 'tilt'" in found
+    assert "= rename 'tlit' to 'tilt'; expected: def tilt(message)" in found
 
 
 def test_a_specification_without_a_core_is_checked_alone(capsys: Captured) -> None:

@@ -100,7 +100,10 @@ class Wiring:
             return False
         if name not in self.blocks:
             if not self.has_more_blocks:
-                self.faults.error(f"unknown block '{name}'", name.source, nearest(name, self.blocks))
+                hint = nearest(name, self.blocks.keys() - self.ambiguous)
+                if len(self.ambiguous) == 1:
+                    hint = f"rename one of the blocks '{next(iter(self.ambiguous))}' to '{name}'?"
+                self.faults.error(f"unknown block '{name}'", name.source, hint)
             self.strays |= {side.kind for side in self.outputs.get(block.name, ())}
             return False
         target = self.blocks[name]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.written.specification import SOFTWARE, SOURCE_SUFFIXES
-from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
 from fusesoc_firm.text.files import is_file
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.yaml_text import Text
@@ -54,7 +54,8 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))
     hint = f"expected: {prototype(type_)}"
     try:
-        found = definition(ast.parse(file.text), function_name(type_))
+        module = ast.parse(file.text)
+        found = definition(module, function_name(type_))
     except (SyntaxError, ValueError) as error:
         line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
         faults.error(
@@ -62,7 +63,9 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         )
         return
     if found is None:
-        faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)
+        near = closest(function_name(type_), [item.name for item in module.body if isinstance(item, ast.FunctionDef)])
+        renamed = f"rename '{near}' to '{function_name(type_)}'; " if near else ""
+        faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, renamed + hint)
     elif isinstance(found, ast.FunctionDef) and not takes(found.args, len(type_.inputs)):
         count = len(type_.inputs)
         message = f"'{found.name}' cannot be called with {count} message{'' if count == 1 else 's'}"
