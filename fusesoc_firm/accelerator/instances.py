@@ -52,8 +52,11 @@ class Instances:
         """Add the faults of all instances in elaborated modules, as Yosys' JSON has them."""
         for cell in (cell for module in modules.values() for cell in module["cells"].values()):
             kind = str(cell["type"])
-            if kind not in modules and not kind.startswith("$"):
-                self._compare(kind, cell, place(*source_place(cell["attributes"]) or (paths[0], 1, 1)), faults)
+            source = place(*source_place(cell["attributes"]) or (paths[0], 1, 1))
+            if kind in modules:
+                _compare_names(modules[kind], cell, source, faults)
+            elif not kind.startswith("$"):
+                self._compare(kind, cell, source, faults)
 
     def _compare(self, kind: str, cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics) -> None:
         if not (entity := self._entities.get(kind)):
@@ -100,6 +103,15 @@ class Instances:
             message = f"there is no module '{kind}' in the sources and in the VHDL of other cores"
             near = closest(kind, self._entities)
             faults.error(message, source, f"did you mean '{near}'?" if near else "add its file to 'sources'")
+
+
+def _compare_names(module: Mapping[str, Any], cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics) -> None:
+    """Add the ports of an instance that its module, in one of the sources, does not have."""
+    name = module["attributes"].get("hdlname", cell["type"])
+    for port in cell["connections"]:
+        # Ports that are connected by position have numbers.
+        if port not in module["ports"] and not port.startswith("$"):
+            faults.error(f"'{name}' has no port '{port}'", source, _legal(port, module["ports"]))
 
 
 def _legal(name: str, names: Iterable[str]) -> str:

@@ -147,7 +147,9 @@ class VhdlReader:
         """Return a hint about a fault, such as the core with a missing library or unit, or an empty text."""
         if found := _MISSING_UNIT.match(text):
             name = self._known.core_with(found["library"] or found["of"], found["unit"] or "")
-            return f"it is in {name}, on which the accelerator's core must depend" if name else ""
+            if name:
+                return f"it is in {name}, on which the accelerator's core must depend"
+            return f"add the file with '{found['unit']}' to 'sources'" if found["of"] == "work" else ""
         path = Path(source.file)
         return hint(text, lines_of(path), self._formals(path, source))
 

@@ -51,6 +51,12 @@ _HINTS = tuple(
             r"[\"']end[\"'] must be followed by [\"'](\w+)",
             "an 'end {0};' is missing above: each 'if', 'case', 'loop' and 'process' has its own",
         ),
+        (r"object class keyword such as", "is the 'begin' of the architecture missing above?"),
+        (
+            r"signal declaration not allowed in process",
+            "declare a variable here, or the signal above the 'begin' of the architecture",
+        ),
+        (r"unexpected token ''' in a primary", "a vector has double quotes, such as \"0001\"; '1' is one bit"),
         (r"unexpected end of file", "an 'end' is missing: the architecture ends with 'end architecture;'"),
         (r"[\"'];[\"'] or [\"']\)[\"'] expected after interface", "is a ';' missing at the end of the line above?"),
         (r"extra [\"'];[\"'] at end of interface", "the last port or generic has no ';'"),

@@ -81,6 +81,10 @@ def _run(argv: Sequence[str] | None) -> int:
             from fusesoc_firm.cli.here import spec_here
 
             arguments.spec = spec_here(*filter(None, [arguments.spec]))
+        elif hasattr(arguments, "spec"):
+            from fusesoc_firm.cli.here import check_is_spec
+
+            check_is_spec(arguments.spec)
         arguments.handler(arguments)
         sys.stdout.flush()
     except BrokenPipeError:

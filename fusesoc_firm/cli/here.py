@@ -8,6 +8,8 @@ from pathlib import Path
 from fusesoc_firm.text.diagnostics import fail, nearest_file
 from fusesoc_firm.text.outputs import shown
 
+_OTHER_SUFFIXES = (".core", ".vhd", ".vhdl", ".v", ".sv", ".cpp", ".py", ".bag", ".db3", ".mcap")
+
 
 def spec_here(folder: Path = Path()) -> Path:
     """Return the specification of the only system in a folder. Raise `InputError` unless there is exactly one."""
@@ -15,6 +17,15 @@ def spec_here(folder: Path = Path()) -> Path:
 
     check_specs_of(folder)
     return _only(specs_in(folder), folder, "specification of a system", "a specification")
+
+
+def check_is_spec(path: Path) -> None:
+    """Raise `InputError` for a file of another kind, such as a source or a core."""
+    if path.is_file() and path.suffix.lower() in _OTHER_SUFFIXES:
+        from fusesoc_firm.system.message_sources import specs_in
+
+        names = " or ".join(map(str, specs_in(path.parent)))
+        fail(f"{path} is not a specification", hint=f"name {names}" if names else "a specification is a YAML file")
 
 
 def core_here(folder: Path = Path()) -> Path:
@@ -47,6 +58,8 @@ def core_named(system: str | None) -> tuple[str, Path | None]:
     if not system or any(path.glob("*.core")):
         path = core_here(path)
     elif path.suffix not in (".yaml", ".yml", ".core"):
+        if path.is_file():
+            fail(f"{path} is neither a specification (.yaml) nor a core (.core)", hint="omit it, or name one of these")
         return str(system), None
     if not path.is_file():
         fail(f"there is no file {path}", hint=nearest_file(path))

@@ -176,7 +176,8 @@ def read_yaml(
         is_missing = isinstance(error, FileNotFoundError)
         fail(f"cannot read {name}: {error.strerror}", hint=nearest_file(path) if is_missing else "")
     except UnicodeDecodeError as error:
-        fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
+        source = byte_place(name, error.object, error.start)
+        fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", source, "save the file as UTF-8 in the editor")
     noted = Diagnostics() if faults is None else faults
     read = parse_yaml(text, name, noted, bounds)
     if faults is None:

@@ -161,6 +161,7 @@ VERILOG = [
         "unknown",
         "there is no module 'unknown' in the sources and",
     ),
+    (_ZERO, "copy u (.ii(in_step), .o(out_data));", "copy u", "'copy' has no port 'ii'"),
     # sources of signals
     (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
     ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),
@@ -176,6 +177,7 @@ LEGAL_VERILOG = [
     "assign out_data = in_msg_valid ? 32'bz : 0; assign out_data[0] = 1'bz;",
     _INSTANCE,
     "copy u (.i(in_step), .o({out_data[3:0], out_data[31:4]}));",
+    "copy u (in_step, out_data);",
     "integer i; reg [31:0] a, b; assign out_data = a ^ b;"
     + "".join(f" always @(posedge clk) for (i = 0; i < 32; i = i + 1) {name}[i] <= in_step[31 - i];" for name in "ab"),
     "reg [31:0] m[0:3]; always @(posedge clk) m[in_step[1:0]] <= in_step; assign out_data = m[in_width[1:0]];",
@@ -257,6 +259,9 @@ _PROCESS = "process (clk)\n  begin\n    if rising_edge(clk) then\n      out_data
         ("    clk   : in  std_logic;", "    clk   : in  std_logic", "is a ';' missing at the end of the line above?"),
         ("out_msg_ready                  : in  std_logic\n", "out_msg_ready : in std_logic;\n", "has no ';'"),
         ("end architecture;", "", "an 'end' is missing"),
+        (_OUT, "out_data <= '00000000';", "a vector has double quotes"),
+        (_OUT, "process (clk) signal s : bit; begin out_data <= in_step; end process;", "declare a variable here"),
+        (_OUT, f"{_OUT} u : entity work.gain port map (clk => clk);", "add the file with 'gain' to 'sources'"),
         ("architecture rtl of img", "architecture rtl of image", "the entity in this file is 'img'"),
         (_OUT, "out_data <= in_step(15 downto 0);", "compare the ranges"),
     ],

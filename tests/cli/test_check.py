@@ -148,6 +148,20 @@ def test_a_specification_in_another_folder_is_found(capsys: Captured) -> None:
     assert "= did you mean 'specs/tilt.yaml'?" in faults(capsys, "check")
 
 
+@pytest.mark.parametrize("words", [["check", "rtl/tilt.vhd"], ["check", "tilt.core"], ["system", "show", "model.py"]])
+def test_a_file_of_another_kind_is_not_a_specification(words: list[str], capsys: Captured) -> None:
+    found = faults(capsys, *words)
+    assert found.startswith(f"error: {words[-1]} is not a specification\n")
+    assert ("= name tilt.yaml" in found) == ("rtl" not in words[-1])
+
+
+def test_a_source_is_not_simulated(capsys: Captured) -> None:
+    assert faults(capsys, "sim", "rtl/tilt.vhd") == (
+        "error: rtl/tilt.vhd is neither a specification (.yaml) nor a core (.core)\n"
+        "      = omit it, or name one of these\n"
+    )
+
+
 def test_only_the_first_of_many_messages_are_answered(capsys: Captured) -> None:
     Path("stimuli.yaml").write_text("- sub: {x: 0.0}\n" * 101)
     edit("model.py", "    answer = ", "    print(message)\n    answer = ")

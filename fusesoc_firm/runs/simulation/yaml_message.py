@@ -21,6 +21,8 @@ from fusesoc_firm.message.wire import WireType
 from fusesoc_firm.text.diagnostics import Diagnostics, nearest
 from fusesoc_firm.text.yaml_text import YamlText, is_null, items, kind
 
+# Fields of times, each with its name in the other version of ROS.
+_OF_OTHER_ROS = {"nsec": "nanosec", "nanosec": "nsec", "nsecs": "nsec", "secs": "sec"}
 _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 
 
@@ -94,7 +96,9 @@ class _Reader:
             if key in branch.fields:
                 found[str(key)] = self._field(value, branch.fields[key], f"{path}.{key}" if path else str(key))
             else:
-                self._error(f"{what} has no field '{key}'", key_node, nearest(key, branch.fields))
+                near = _OF_OTHER_ROS.get(key, "")
+                hint = f"did you mean '{near}'?" if near in branch.fields else nearest(key, branch.fields)
+                self._error(f"{what} has no field '{key}'", key_node, hint)
         return found
 
     def _field(self, node: yaml.Node, branch: _Branch, path: str) -> Any:
@@ -102,7 +106,8 @@ class _Reader:
             return self._element(node, branch, path)
         size = "" if branch.count is None else f" of {branch.count}"
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{path}' must be a list{size}, not {kind(node)}", node)
+            hint = f"write [{node.value}, ...]" if isinstance(node, yaml.ScalarNode) and not is_null(node) else ""
+            self._error(f"'{path}' must be a list{size}, not {kind(node)}", node, hint)
             return None
         if branch.count is not None and len(node.value) != branch.count:
             self._error(f"'{path}' must be a list{size}, not of {len(node.value)}", node)

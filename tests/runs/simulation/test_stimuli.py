@@ -360,3 +360,22 @@ def test_a_message_that_is_too_long(tmp_path: Path) -> None:
     assert "add 'maxLength: 8' or more to the block" in str(raised.value)
     path.write_text("- name: {data: abc}\n", encoding="utf-8")
     assert len(read_stimuli(path, [subscriber])) == 1
+
+
+@pytest.mark.parametrize(
+    ("ros", "message", "text", "hint"),
+    [
+        (ROS2, "sensor_msgs/Imu", "{header: {stamp: {nsec: 2}}}", "did you mean 'nanosec'?"),
+        (ROS1, "std_msgs/Time", "{data: {nanosec: 2}}", "did you mean 'nsec'?"),
+        (ROS2, "sensor_msgs/Imu", "{orientation_covariance: 1.5}", "write [1.5, ...]"),
+        (ROS2, "sensor_msgs/Imu", "{orientation_covariance: {x: 1}}", ""),
+    ],
+)
+def test_a_field_of_the_other_ros_and_a_number_for_a_list_have_cures(
+    ros: Middleware, message: str, text: str, hint: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "stimuli.yaml"
+    path.write_text(f"- sub: {text}\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_stimuli(path, [Converter("sub", frame(message, ros), 0)])
+    assert caught.value.diagnostics[0].hint == hint
