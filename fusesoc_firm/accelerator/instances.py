@@ -107,7 +107,7 @@ class Instances:
 
 def _compare_names(module: Mapping[str, Any], cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics) -> None:
     """Add the ports of an instance that its module, in one of the sources, does not have."""
-    name = module["attributes"].get("hdlname", cell["type"])
+    name = str(module["attributes"].get("hdlname", cell["type"])).lstrip("\\")
     for port in cell["connections"]:
         # Ports that are connected by position have numbers.
         if port not in module["ports"] and not port.startswith("$"):

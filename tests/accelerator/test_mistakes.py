@@ -161,7 +161,6 @@ VERILOG = [
         "unknown",
         "there is no module 'unknown' in the sources and",
     ),
-    (_ZERO, "copy u (.ii(in_step), .o(out_data));", "copy u", "'copy' has no port 'ii'"),
     # sources of signals
     (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
     ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),
@@ -318,6 +317,11 @@ def test_a_fault_in_the_syntax_of_verilog_has_a_cure(old: str, new: str, where: 
 @pytest.mark.parametrize("new", LEGAL_VERILOG)
 def test_signals_in_verilog_with_right_sources(new: str) -> None:
     assert diagnostics("verilog", _ZERO, new) == []
+
+
+def test_an_unknown_port_of_an_own_module() -> None:
+    (fault,) = [item for item in diagnostics("verilog", _ZERO, "copy u (.ii(in_step), .o(out_data));") if item.hint]
+    assert (fault.message, fault.hint) == ("'copy' has no port 'ii'", "did you mean 'i'?")
 
 
 def test_what_a_missing_unit_declares_is_unknown() -> None:
