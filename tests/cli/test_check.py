@@ -61,15 +61,10 @@ def test_a_sound_project_is_valid(capsys: Captured) -> None:
         ("model.py", "def ", "import nowhere\n\ndef ", "model.py:4:1: error: the model imports"),
         ("stimuli.yaml", "sub", "sbu", "stimuli.yaml:1:3: error: 'sbu' is not a subscriber"),
         ("stimuli.yaml", "x:", "xx:", "stimuli.yaml:1:9: error: a geometry_msgs/Point has no field 'xx'"),
-        ("tilt.core", "stimuli.yaml", "stimli.yaml", "tilt.core:23:16: error: the stimuli stimli.yaml do not exist"),
-        ("tilt.core", "model.py", "modle.py", "tilt.core:24:14: error: there is no model at modle.py"),
-        (
-            "tilt.core",
-            "      product: simulation\n",
-            "      produkt: simulation\n",
-            "tilt.core:22:7: error: unknown parameter",
-        ),
-        ("tilt.core", "tilt.yaml", "tlit.yaml", "tilt.core:17:13: error: there is no specification tlit.yaml"),
+        ("tilt.core", "stimuli.yaml", "stimli.yaml", "tilt.core:19:61: error: the stimuli stimli.yaml do not exist"),
+        ("tilt.core", "model.py", "modle.py", "tilt.core:19:82: error: there is no model at modle.py"),
+        ("tilt.core", "product: simulation", "produkt: simulation", "tilt.core:19:31: error: unknown parameter"),
+        ("tilt.core", "tilt.yaml", "tlit.yaml", "tilt.core:16:32: error: there is no specification tlit.yaml"),
         ("tilt.core", "CAPI=2:\n", "", "tilt.core:1:1: error: the first line of a core must be 'CAPI=2:'"),
         ("tilt.core", "filesets:\n", "filset:\n", "tilt.core:6:1: error: a core has no key 'filset'"),
         ("tilt.core", "    depend:\n", "    depends:\n", "tilt.core:8:5: error: 'filesets.base' has no key 'depends'"),
@@ -188,7 +183,7 @@ def test_a_specification_without_a_core_is_checked_alone(capsys: Captured) -> No
 def test_a_renamed_specification_is_found_in_the_core(capsys: Captured) -> None:
     Path("tilt.yaml").rename("tilts.yaml")
     found = faults(capsys, "check")
-    assert found.startswith("tilt.core:17:13: error: there is no specification tilt.yaml\n")
+    assert found.startswith("tilt.core:16:32: error: there is no specification tilt.yaml\n")
     assert "= did you mean 'tilts.yaml'?" in found
     for words in (["check", "tilts.yaml"], ["sim"], ["sim", "tilts.yaml"]):
         assert faults(capsys, *words) == found

@@ -152,6 +152,31 @@ def test_words_with_commas_and_quotes_stay_whole(tmp_path: Path) -> None:
     }
 
 
+def test_a_bench_has_a_target_for_each_simulator_of_cocotb(tmp_path: Path) -> None:
+    found = content(new_core(system(tmp_path), "robot.yaml", CoreOptions(bench="test_robot.py")))
+    options = {name: target["flow_options"] for name, target in found["targets"].items() if "cocotb" in name}
+    assert options == {
+        "test_cocotb": {
+            "cocotb_module": "test_robot",
+            "tool": "ghdl",
+            "sim_options": ["--ieee-asserts=disable-at-0"],
+        },
+        "test_cocotb_icarus": {
+            "cocotb_module": "test_robot",
+            "tool": "icarus",
+            "iverilog_options": ["-g2012"],
+            "frontends": ["ghdlsynth"],
+            "ghdlsynth_top": "robot_system",
+        },
+    }
+    assert [name for item in found["filesets"]["cocotb"]["files"] for name in item] == [
+        "test_robot.py",
+        "robot.yaml",
+        "stimuli.yaml",
+        "model.py",
+    ]
+
+
 def test_a_system_with_verilog_is_simulated_with_icarus(tmp_path: Path) -> None:
     found = content(new_core(system(tmp_path, "Verilog", "acc.v"), "robot.yaml", CoreOptions()))
     assert found["targets"]["sim"]["generate"] == ["system", {"simulation": {"simulator": "icarus"}}]

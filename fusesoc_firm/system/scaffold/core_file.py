@@ -115,17 +115,14 @@ def _bench_targets(system: DerivedSystem, bench: str) -> str:
     known = {
         name: item for name, item in fitting(has_verilog=_has_verilog(system)).items() if "g++" not in item.programs
     }
+    module = PurePosixPath(bench).stem
+    flows = {name: simulator_flow(name, system.entity, is_system_verilog=True) for name in known}
     targets = [
         {
             "name": "test_cocotb" if is_first else f"test_cocotb_{name}",
             "title": item.title,
-            "module": PurePosixPath(bench).stem,
-            "options": _mapping(
-                {
-                    "cocotb_module": PurePosixPath(bench).stem,
-                    **simulator_flow(name, system.entity, is_system_verilog=True).options,
-                }
-            ),
+            "module": module,
+            "options": f"{{{_mapping({'cocotb_module': module, **flows[name].options})}}}",
         }
         for is_first, (name, item) in zip((True, False, False), known.items(), strict=False)
     ]
