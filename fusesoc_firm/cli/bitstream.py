@@ -107,10 +107,22 @@ def _build(arguments: argparse.Namespace) -> None:
             _print_failure(arguments, answer["output"], figures)
             cure = "; register stages in the accelerator shorten its longest path" if figures.is_too_slow else ""
             fail(f"there is no bitstream for {chosen.board}", hint=f"the whole output: {log}{cure}")
-        answer.update(bitstream=shown(bitstream), next=f"firm load {_words(arguments.system, chosen.board)}")
+        limits = _limits(chosen, loaded) if loaded else []
+        next_command = f"firm load {_words(arguments.system, chosen.board)}"
+        answer.update(bitstream=shown(bitstream), limits=limits, next=next_command)
     if not (arguments.quiet or arguments.json):
-        print(f"bitstream: {answer['bitstream']}", *figures.lines(), f"log:       {log}", sep="\n")
+        lines = [*figures.lines(), *(f"limit:     {limit}" for limit in limits)]
+        print(f"bitstream: {answer['bitstream']}", *lines, f"log:       {log}", sep="\n")
         print(f"next:      {answer['next']}")
+
+
+def _limits(chosen: BoardBuild, loaded: LoadedSystem) -> list[str]:
+    """Return the longest payloads on the board, which are shorter on a link, where the specification has none."""
+    from fusesoc_firm.core.core_reader import read_core
+    from fusesoc_firm.system.scaffold.board_targets import boards_of, placed
+    from fusesoc_firm.system.views.show import default_lengths
+
+    return default_lengths(placed(loaded, boards_of(read_core(chosen.core_file))[chosen.board]))
 
 
 def _print_failure(arguments: argparse.Namespace, errors: Sequence[str], figures: Figures) -> None:

@@ -102,8 +102,17 @@ def test_steps_and_result_are_lines_of_json(capsys: Captured) -> None:
         "log": "build/robot_sys_tilt_0.1.0/ulx3s.log",
         "clocks": [{"name": "clk", "reached": 63.04, "needed": 25}],
         "area": [{"name": "TRELLIS_COMB", "used": 700, "available": 83640}],
+        "limits": [],
         "next": "firm load --board ulx3s",
     }
+
+
+@pytest.mark.usefixtures("tools")
+def test_the_longest_messages_on_a_board_are_printed(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A link shortens them; tilt's messages have bounds, so they are replaced here."""
+    monkeypatch.setattr("fusesoc_firm.system.views.show.default_lengths", lambda system: [system.link.kind.value])
+    assert main(["bitstream", "--board", "ulx3s"]) == 0
+    assert "limit:     uart\n" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("tools")

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.core.core_reader import read_core
-from fusesoc_firm.system.boards.board import FOLDER
+from fusesoc_firm.system.boards.board import FOLDER, read_board
 from fusesoc_firm.system.message_sources import load_beside
-from fusesoc_firm.system.scaffold.board_targets import boards_of, fits
+from fusesoc_firm.system.scaffold.board_targets import boards_of, fits, placed
+from fusesoc_firm.system.views.show import default_lengths
 from fusesoc_firm.text.diagnostics import InputError
 from tests.system.systems import converter, specification
 
@@ -48,6 +49,20 @@ def test_a_core_has_the_boards_of_its_targets() -> None:
 )
 def test_a_board_is_offered_if_the_system_fits_it(tmp_path: Path, more: str, boards: set[str]) -> None:
     assert offered(f"{{name: robot{more}}}", tmp_path) == boards
+
+
+def test_the_link_of_a_board_shortens_messages_without_bounds(tmp_path: Path) -> None:
+    spec = tmp_path / "robot.yaml"
+    ways = converter("sub", "subscriber", "geometry_msgs/Polygon", "pub", ros="ROS2") + converter(
+        "pub", "publisher", "geometry_msgs/Polygon", ros="ROS2"
+    )
+    spec.write_text(specification(ways, project="{name: robot}"), encoding="utf-8")
+    loaded = load_beside(spec)
+    sentence = "{}: geometry_msgs/Polygon has no bounds and no 'maxLength'; payloads of more than {} bytes are refused"
+    assert default_lengths(loaded.system) == [sentence.format("sub", 65536), sentence.format("pub", 65536)]
+    for board, most in (("ulx3s", 2000), ("zcu104", 65536)):
+        found = default_lengths(placed(loaded, read_board(board)))
+        assert found == [sentence.format("sub", most), sentence.format("pub", 65536)]
 
 
 def test_a_board_of_the_project_is_one_of_its_core(tmp_path: Path) -> None:

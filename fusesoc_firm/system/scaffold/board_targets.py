@@ -36,15 +36,20 @@ def fits(loaded: LoadedSystem, board: Board) -> bool:
     """Return whether a system can be built for a board: with its link, clocks and pins."""
     if not has_target(loaded.system, board):
         return False
-    faults, specification = Diagnostics(), on_board(loaded.specification, board)
     try:
-        system = derive(specification, loaded.folder, loaded.libraries, faults, needs_sources=False)
-        check_ethernet(specification, system, faults)
-        faults.raise_if_any()
-        check_fits(system, board)
+        check_fits(placed(loaded, board), board)
     except InputError:
         return False
     return True
+
+
+def placed(loaded: LoadedSystem, board: Board) -> DerivedSystem:
+    """Return a system as it is built for a board, with the board's link. May raise `InputError`."""
+    faults, specification = Diagnostics(), on_board(loaded.specification, board)
+    system = derive(specification, loaded.folder, loaded.libraries, faults, needs_sources=False)
+    check_ethernet(specification, system, faults)
+    faults.raise_if_any()
+    return system
 
 
 def has_target(system: DerivedSystem, board: Board) -> bool:
