@@ -201,7 +201,14 @@ def test_a_block_and_its_line_lead_to_each_other(robot: Path, tmp_path: Path) ->
     seen(robot, tmp_path, (1400, 1000), steps)
 
 
-def test_an_evaluation_adds_the_times_that_it_needs(robot: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("period", "verdict"),
+    [
+        ("20 ms", "all messages meet their deadlines; the messages need 0 % of the channel's time"),
+        ("50 ns", "overloaded: the messages need 180 % of the channel's time; late: b"),
+    ],
+)
+def test_an_evaluation_adds_the_times_that_it_needs(robot: Path, tmp_path: Path, period: str, verdict: str) -> None:
     robot.write_text(TEXT.replace("width: 32", "width: 32, clock: 100 MHz"), encoding="utf-8")
 
     async def steps(page: Page) -> None:
@@ -209,10 +216,11 @@ def test_an_evaluation_adds_the_times_that_it_needs(robot: Path, tmp_path: Path)
         await page.until(f"({view('evaluate')}.click(), true)")
         await page.until("document.querySelector('.gaps label')?.textContent.includes(\"b needs a 'period'\")")
         await page.evaluate("document.querySelector('.gaps input').focus()")
-        await page.write("20 ms")
+        await page.write(period)
         await page.press("Enter")
         await page.until("document.querySelector('.view').innerText.includes('Schedulers for this system')")
-        assert yaml.safe_load(robot.read_text(encoding="utf-8"))["blocks"][2]["period"] == "20 ms"
+        assert yaml.safe_load(robot.read_text(encoding="utf-8"))["blocks"][2]["period"] == period
+        await page.until(f"document.querySelector('.verdict').textContent === {json.dumps(verdict)}")
 
     seen(robot, tmp_path, (1400, 900), steps)
 
