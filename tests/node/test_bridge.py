@@ -72,11 +72,23 @@ def test_a_python_of_ros_that_cannot_be_started(tmp_path: Path) -> None:
     assert len([*Path("/proc/self/fd").iterdir()]) == before
 
 
+def closed(*_: object, **__: object) -> None:
+    """The other end has closed the socket already."""
+    raise BrokenPipeError
+
+
+@pytest.mark.parametrize("has_ended", [False, True], ids=["ends", "has ended"])
 @pytest.mark.parametrize(("ros", "module"), [(1, "rospy"), (2, "rclpy")])
-def test_a_python_without_ros(ros: int, module: str, tmp_path: Path) -> None:
+def test_a_python_without_ros(
+    ros: int, module: str, has_ended: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = ""
+    if has_ended:
+        begin = "exit 1\n"
+        monkeypatch.setattr(Channel, "send", closed)
     # Without its packages and PYTHONPATH, this Python cannot import the modules of ROS.
     python = tmp_path / "python"
-    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" -E -S "$@"\n', encoding="utf-8")
+    python.write_text(f'#!/bin/sh\n{begin}exec "{sys.executable}" -E -S "$@"\n', encoding="utf-8")
     python.chmod(0o755)
     with pytest.raises(CarrierError, match=f"python cannot import {module}, which ROS {ros} installs; .* install"):
         RosCarrier(ros, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=str(python)))

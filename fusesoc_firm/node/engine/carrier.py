@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -194,7 +195,9 @@ class RosCarrier:
             "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
-            self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
+            # If the process has ended already, its fault is found next.
+            with suppress(OSError):
+                self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
             self.subscribers, self.publishers, self.services = self._wait_until_ready()
         except BaseException:
             self._end(0)
