@@ -301,7 +301,7 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
     files |= _sources(system.accelerator_types, loaded.folder)
     files |= {path: made[path] for path in after}
     if loaded.board:
-        files |= _board_files(loaded, loaded.board) | flow_file(loaded.board.edalize_flow)
+        files |= flow_file(loaded.board.edalize_flow) | _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)
 
 

@@ -9,6 +9,7 @@ import pytest
 from fusesoc_firm.core.request import GeneratedFile, Request
 from fusesoc_firm.system.system_core import load_requested, system_core
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.flows import SUFFIX
 
 SPECIFICATION = """\
 project: {{name: robot, width: 16{clocks}}}
@@ -51,7 +52,7 @@ def made(folder: Path, clocks: str = "", at: str = "", board: str = "zynq7000") 
 
 def test_what_comes_for_a_processor(tmp_path: Path) -> None:
     files = made(tmp_path)
-    types = {name: file.file_type for name, file in files.items() if not name.endswith(".vhd")}
+    types = {name: file.file_type for name, file in files.items() if not name.endswith((".vhd", SUFFIX))}
     assert types == {
         "turn/src/turn.cpp": "user",
         "turn/src/turn.hpp": "user",
