@@ -31,6 +31,8 @@ class Parser(argparse.ArgumentParser):
 
     def refuse(self, words: Sequence[str]) -> NoReturn:
         """End the program because of words that the parser does not know."""
+        if "--ros-args" in words:
+            self.error("'--ros-args' is an option of 'firm live', which runs a system as a node of ROS")
         known = self._option_string_actions
         near = next((near for word in words if (near := closest(word.partition("=")[0], known))), None)
         self.error(f"unrecognized arguments: {' '.join(words)}{f'; did you mean {near!r}?' if near else ''}")

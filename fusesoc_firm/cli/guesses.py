@@ -9,7 +9,7 @@ from typing import NoReturn
 from fusesoc_firm.cli.common import Parser
 from fusesoc_firm.text.diagnostics import Diagnostic, closest
 
-# Words of other tools, each with the command line that does the same here.
+# Words of other tools, each with the command lines, separated by bars, that do the same here.
 GUESSES = {
     **dict.fromkeys(("create", "start", "project", "pkg", "quickstart", "tutorial"), "init NAME"),
     **dict.fromkeys(("add", "extend"), "init --extend SPEC"),
@@ -18,10 +18,11 @@ GUESSES = {
     **dict.fromkeys(("wave", "waves"), "sim --waves"),
     **dict.fromkeys(("launch", "bridge", "node", "ros2", "rosrun", "roslaunch"), "live"),
     **dict.fromkeys(("play", "bag"), "replay --in BAG --out BAG"),
-    **dict.fromkeys(("gui", "page", "edit", "open", "view", "viz", "web"), "studio"),
+    **dict.fromkeys(("gui", "ui", "page", "edit", "open", "view", "viz", "web", "serve", "dashboard"), "studio"),
     **dict.fromkeys(("msg", "messages", "types", "interface", "ls"), "message list"),
     **dict.fromkeys(("topic", "topics", "info"), "system show"),
-    **dict.fromkeys(("generate", "gen", "core", "update"), "system core SPEC"),
+    **dict.fromkeys(("generate", "gen", "codegen", "convert"), "init NAME|system core SPEC"),
+    **dict.fromkeys(("core", "update", "upgrade"), "system core SPEC"),
     **dict.fromkeys(("draw", "plot"), "system diagram"),
     **dict.fromkeys(("install", "setup", "tools"), "doctor"),
     **dict.fromkeys(("pytest", "regress", "regression"), "test"),
@@ -48,10 +49,10 @@ def _lines(word: str, parser: Parser) -> Iterator[str]:
     actions = {name: group.commands() for name, group in commands.items() if isinstance(group, Parser)}
     lowered = word.lower()
     exact = [f"{name} {lowered}" for name, known in actions.items() if lowered in known]
-    exact += [GUESSES[lowered]] if lowered in GUESSES else []
+    exact += GUESSES[lowered].split("|") if lowered in GUESSES else []
     yield from exact
     if not exact:
         # The usual name of a command with several names is that of its parser.
         lines = {**GUESSES, **{name: known.prog.removeprefix("firm ") for name, known in commands.items()}}
         near = closest(word, lines)
-        yield from [lines[near]] if near else []
+        yield from lines[near].split("|") if near else []
