@@ -19,6 +19,7 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 """A function in a user's text."""
 
 _MODULE = "_user_code"
+_OF_ROS = ("rclpy", "rospy", "roslib")
 # Usual names of modules that are not the modules' own.
 _ABBREVIATIONS = {"np": "numpy"}
 
@@ -128,8 +129,15 @@ def _cure(error: BaseException, fields: Sequence[str]) -> str:
         case KeyError(args=[str(key)]) if fields:
             return nearest(key, fields)
         case ModuleNotFoundError(name=str(name)):
-            return f"install '{name}' with pip"
+            return absent_module(name)
     return ""
+
+
+def absent_module(name: str) -> str:
+    """Return the cure of an import of a module that is not installed."""
+    if name in _OF_ROS or name.endswith(("_msgs", "_interfaces")):
+        return "messages are dictionaries here, without ROS: remove the import"
+    return f"install '{name}' with pip"
 
 
 def _names(value: object) -> Iterator[str]:

@@ -65,7 +65,7 @@ _HINTS = tuple(
         (r"port [\"']\w+[\"'] cannot be read", f"assign a signal, and the port from it; or {_STANDARD}"),
         (
             r"no function declarations for operator [\"'](?:[-+*/]|[<>]=?|mod|rem)[\"']",
-            f"a std_logic_vector is not a number: {_NUMERIC}",
+            f"a std_logic_vector is not a number: a float needs an operation such as firm_float_add; else, {_NUMERIC}",
         ),
         (
             r"no function declarations for operator",

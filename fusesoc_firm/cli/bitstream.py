@@ -118,11 +118,10 @@ def _build(arguments: argparse.Namespace) -> None:
 
 def _limits(chosen: BoardBuild, loaded: LoadedSystem) -> list[str]:
     """Return the longest payloads on the board, which are shorter on a link, where the specification has none."""
-    from fusesoc_firm.core.core_reader import read_core
-    from fusesoc_firm.system.scaffold.board_targets import boards_of, placed
+    from fusesoc_firm.system.scaffold.board_targets import placed
     from fusesoc_firm.system.views.show import default_lengths
 
-    return default_lengths(placed(loaded, boards_of(read_core(chosen.core_file))[chosen.board]))
+    return default_lengths(placed(loaded, chosen.board_file))
 
 
 def _print_failure(arguments: argparse.Namespace, errors: Sequence[str], figures: Figures) -> None:

@@ -243,7 +243,7 @@ _PROCESS = "process (clk)\n  begin\n    if rising_edge(clk) then\n      out_data
             "numeric_std",
         ),
         (_OUT, "out_data <= std_logic_vector(unsigned(in_step) + to_unsigned(1, 32));", "'use ieee.numeric_std.all;'"),
-        (_OUT, "out_data <= in_step + 1;", "a std_logic_vector is not a number"),
+        (_OUT, "out_data <= in_step + 1;", "a std_logic_vector is not a number: a float needs an operation"),
         (_OUT, "out_data <= in_step and '1';", "both sides need the same type"),
         (_OUT, "out_data <= in_stp;", "did you mean 'in_step'?"),
         (_OUT, "out_data <= in_step when in_msg_valid;", "a condition is a comparison, such as valid = '1'"),

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.accelerator.user_code import fail_missing, nodes_of, place_in, place_of
+from fusesoc_firm.accelerator.user_code import absent_module, fail_missing, nodes_of, place_in, place_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.runs.simulation.reference import ANSWER, NAME, PARAMETERS
 from fusesoc_firm.system.derived.python_function import definition, takes
@@ -70,7 +70,7 @@ def _check_imports(module: ast.Module, path: Path, faults: Diagnostics) -> None:
             beside = (path.parent / name, path.parent / f"{name}.py")
             if importlib.util.find_spec(name) is None and not any(map(Path.exists, beside)):
                 message = f"the model imports '{name}', which is not installed"
-                faults.error(message, place_of(path, statement), "install it with pip")
+                faults.error(message, place_of(path, statement), absent_module(name))
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,14 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             ),
         ),
         (
+            "from any_arm_msgs.msg import Joint\n",
+            (
+                "model.py:1:1: error: the model raised ModuleNotFoundError: No module named 'any_arm_msgs'\n"
+                "    1 | from any_arm_msgs.msg import Joint\n      | ^\n"
+                "      = messages are dictionaries here, without ROS: remove the import"
+            ),
+        ),
+        (
             "def respond(block, m)\n    return []\n",
             (
                 "model.py:1:22: error: the model is not valid Python: expected ':'\n"
