@@ -344,8 +344,9 @@ class MessageLibrary:
         builtin_types = sorted(self.ros.builtin_types)
         primitives = difflib.get_close_matches(name.name, builtin_types, n=1, cutoff=0.8)
         known = [*self.names(), *(interface.name for interface in self._interfaces)]
-        # Two names of packages are always similar.
-        types = difflib.get_close_matches(name.name, sorted({item.name for item in known}), n=1, cutoff=0.65)
+        # Two names of packages are always similar, and the types of an unknown package are probably not known.
+        cutoff = 0.6 if name.package in {item.package for item in known} else 0.7
+        types = difflib.get_close_matches(name.name, sorted({item.name for item in known}), n=1, cutoff=cutoff)
         names = [str(item) for item in known if item.name in types]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1, cutoff=0)), "")
 
