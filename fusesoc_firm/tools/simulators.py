@@ -33,7 +33,6 @@ class Simulator:
     """
 
     title: str
-    remark: str = ""
     reads_vhdl: bool = False
     calls_functions: bool = False
     programs: tuple[str, ...] = ()
@@ -57,7 +56,6 @@ SIMULATORS: dict[str, Simulator] = {
     ),
     "icarus": Simulator(
         "Icarus Verilog",
-        ", of the netlist that GHDL makes of the VHDL",
         programs=("iverilog",),
         system_verilog={"iverilog_options": ["-g2012"]},
         # Edalize starts the simulator with `-fst`.
@@ -65,7 +63,6 @@ SIMULATORS: dict[str, Simulator] = {
     ),
     "verilator": Simulator(
         "Verilator",
-        ", which is the fastest and takes the longest to build",
         programs=("verilator", "g++", "make"),
         options={
             "mode": "cc",

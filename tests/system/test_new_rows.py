@@ -23,7 +23,7 @@ from fusesoc_firm.tools.flows import FAMILIES, Family
 from fusesoc_firm.tools.simulators import SIMULATORS, Live, Simulator
 
 SIMULATORS["xcelium"] = Simulator(
-    "Xcelium", ", of which this test knows the name alone", reads_vhdl=True, programs=("xrun",),
+    "Xcelium", reads_vhdl=True, programs=("xrun",),
     options={"xrun_options": ["-v93"]}, live=Live("-generic "),
 )
 FAMILIES["nexus"] = Family("Lattice Nexus", ("-noflatten",))
