@@ -15,6 +15,7 @@ import pytest
 
 from tests.cores import operations
 from tests.cores.models import load_model
+from tests.cores.operators import FORMS, Form
 from tests.hdl.ghdl import CORES, Generic, Library, core_files
 from tests.seeds import seeded
 
@@ -358,51 +359,48 @@ def test_conversions_to_fixed_point(
     assert not wrong, (len(wrong), wrong[:10])
 
 
-# In cycles, as docs/reference/arithmetic.md states them: of float64, then of float32.
-LATENCIES = {
-    "add": (14, 14),
-    "multiply": (15, 14),
-    "multiply_add": (21, 18),
-    "divide": (64, 35),
-    "square_root": (58, 29),
-    "compare": (1, 1),
-    "clamp": (2, 2),
-    "resize": (7, 8),
-    "from_fixed": (8, 8),
-    "to_fixed": (6, 6),
-    "sincos": (106, 77),
-    "low_pass": (45, 39),
-    "pid": (113, 98),
-}
-# Cycles from one result to the next, unless a result leaves in every cycle.
-INTERVALS = {
-    "divide": (57, 28),
-    "square_root": (56, 27),
-    "sincos": (107, 78),
-    "low_pass": (46, 40),
-    "pid": (114, 99),
-}
+def bench_generics(form: Form) -> dict[str, Generic]:
+    """The generics of the bench for an operator's form; a conversion between sizes has others than its entity."""
+    exponent_bits, mantissa_bits = SIZES[form.size]
+    other = SIZES["float32" if form.size == "float64" else "float64"]
+    sizes = {"OUT_EXPONENT_BITS": other[0], "OUT_MANTISSA_BITS": other[1]}
+    own = {} if form.operator == "resize" else form.facts["generics"]
+    return {"EXPONENT_BITS": exponent_bits, "MANTISSA_BITS": mantissa_bits, **sizes, **own}
+
+
+def measured(library: Library, folder: Path, form: Form, bits: int, count: int, **generics: Generic) -> Any:
+    """Latency and number of all cycles for `count` times the same operands, of these bits; neither side stalls."""
+    numbers = Numbers(form.size)
+    width = int(generics.get("WIDTH", 32)) if form.operator == "from_fixed" else numbers.width
+    rows = [[bits] * OPERANDS.get(form.operator, 1)] * count
+    generics = {**bench_generics(form), **generics}
+    _, report = operate(library, folder, width, rows, OPERATION=form.operator, STALLS=0, **generics)
+    return map(int, re.findall(r"\d+", report.splitlines()[-1]))
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.parametrize("name", SIZES)
-@pytest.mark.parametrize("operation", LATENCIES)
-def test_latency_and_throughput(library: Library, tmp_path: Path, operation: str, name: str) -> None:
-    numbers = Numbers(name)
-    rows = [[0]] * 50
-    one, three = numbers.width, 3 * numbers.width
-    width = {"from_fixed": 32, "multiply_add": three, "clamp": three}
-    width |= {"square_root": one, "resize": one, "to_fixed": one, "sincos": one, "low_pass": three, "pid": 8 * one}
-    other = SIZES["float32" if name == "float64" else "float64"]
-    generics = {**size_of(numbers), "OUT_EXPONENT_BITS": other[0], "OUT_MANTISSA_BITS": other[1]}
-    if operation == "sincos":
-        generics["FRACTION"] = {"float64": 58, "float32": 30}[name]
-    bits = width.get(operation, 2 * numbers.width)
-    _, report = operate(library, tmp_path, bits, rows, OPERATION=operation, STALLS=0, **generics)
-    latency, cycles = map(int, re.findall(r"\d+", report.splitlines()[-1]))
-    assert latency == LATENCIES[operation][list(SIZES).index(name)]
-    interval = INTERVALS.get(operation, (1, 1))[list(SIZES).index(name)]
-    assert cycles == latency + interval * (len(rows) - 1) + 1
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_latency_and_throughput(library: Library, tmp_path: Path, form: Form) -> None:
+    latency, cycles = measured(library, tmp_path, form, 0, 50)
+    assert latency == form.latency(32)
+    assert cycles == latency + form.facts["interval"] * 49 + 1
+
+
+@pytest.mark.parametrize("form", [form for form in FORMS if "longest" in form.facts], ids=str)
+def test_the_longest_latency_is_that_of_the_smallest_numbers(library: Library, tmp_path: Path, form: Form) -> None:
+    latency, _ = measured(library, tmp_path, form, 1, 1)
+    assert latency == form.facts["longest"]
+
+
+WIDTHS_OF_CONVERSIONS = [2, 4, 5, 13, 14, 16, 17, 61, 62, 64, 65, 128]
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("width", WIDTHS_OF_CONVERSIONS)
+@pytest.mark.parametrize("form", [form for form in FORMS if form.operator in ("from_fixed", "to_fixed")], ids=str)
+def test_latency_of_a_conversion_by_width(library: Library, tmp_path: Path, form: Form, width: int) -> None:
+    latency, _ = measured(library, tmp_path, form, 1, 1, WIDTH=width)
+    assert latency == form.latency(width)
 
 
 ENTITIES = {
