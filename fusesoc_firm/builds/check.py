@@ -23,13 +23,11 @@ from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest_file
 from fusesoc_firm.text.outputs import shown
 
-_SIMULATION = "sim"
 
+def check_core(file: CoreFile, simulation: str, *, may_run: bool = False) -> None:
+    """Check the targets of a system's core, and all that a simulation reads. Raise `InputError` with all faults.
 
-def check_core(file: CoreFile, *, may_run: bool = False) -> None:
-    """Check the targets of a system's core, and all that its simulation reads. Raise `InputError` with all faults.
-
-    The user's Python code is only read unless it `may_run`.
+    `simulation` is the simulation's target. The user's Python code is only read unless it `may_run`.
     """
     from fusesoc.coremanager import DependencyError
 
@@ -42,7 +40,7 @@ def check_core(file: CoreFile, *, may_run: bool = False) -> None:
         fail(f"FuseSoC does not know the core '{name}'", file.place_of(name), ignored(fusesoc, name))
     for target in core.get_data({}).targets:
         _check_target(core, target, faults)
-    for call in _calls(fusesoc, core, faults):
+    for call in _calls(fusesoc, core, simulation, faults):
         with faults.noting():
             _check_call(call, may_run=may_run)
     faults.raise_if_any()
@@ -63,11 +61,11 @@ def _check_target(core: Any, target: str, faults: Diagnostics) -> None:
             faults.error(fault.message, fault.source, fault.hint)
 
 
-def _calls(fusesoc: Any, core: Any, faults: Diagnostics) -> Iterator[GeneratorCall]:
+def _calls(fusesoc: Any, core: Any, simulation: str, faults: Diagnostics) -> Iterator[GeneratorCall]:
     """Yield the calls of our generators for the simulation; note missing files of cores on this machine."""
-    if _SIMULATION not in core.get_data({}).targets:
+    if simulation not in core.get_data({}).targets:
         return
-    for item, flags in solved(fusesoc, core, _SIMULATION):
+    for item, flags in solved(fusesoc, core, simulation):
         _check_present(item, flags, faults)
         yield from (call for call in calls_of(item, flags) if call.generator in GENERATORS)
 

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.system_core import LoadedSystem
 
 
+# The target that simulates a system by default.
+_SIMULATION = "sim"
+
+
 def add_check(commands: Any) -> None:
     """Declare the command, which is also an action of `firm system`."""
     check = command(
@@ -73,10 +77,10 @@ def _check_as_json(arguments: argparse.Namespace) -> None:
         sys.exit(1)
 
 
-def check_core_file(core: Path, *, may_run: bool = False) -> LoadedSystem | None:
+def check_core_file(core: Path, simulation: str = _SIMULATION, *, may_run: bool = False) -> LoadedSystem | None:
     """Check the system of a core's file, and return it, or None for a core of another kind; print the warnings.
 
-    `may_run` has the meaning as for `check_all`. May raise `InputError`.
+    `simulation` and `may_run` have the meaning as for `check_all`. May raise `InputError`.
     """
     from fusesoc_firm.system.message_sources import check_specs_of, load_beside, spec_of
 
@@ -86,7 +90,7 @@ def check_core_file(core: Path, *, may_run: bool = False) -> LoadedSystem | None
     spec = Path(shown(spec))
     check_specs_of(spec.parent)
     loaded = load_beside(spec, core_folders=core_folders)
-    print_warnings(check_all(loaded, spec, may_run=may_run))
+    print_warnings(check_all(loaded, spec, simulation=simulation, may_run=may_run))
     return loaded
 
 
@@ -97,7 +101,7 @@ def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = (), *,
     from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
-    print_warnings(check_all(loaded, arguments.spec, stimuli, with_core=with_core))
+    print_warnings(check_all(loaded, arguments.spec, stimuli, simulation=_SIMULATION if with_core else None))
     system = loaded.system
     memory = memory_of(system, loaded.libraries)
     node = ethernet_node(system, loaded.libraries)
@@ -117,13 +121,13 @@ def check_all(
     spec: Path,
     stimuli: Iterable[Path] = (),
     *,
-    with_core: bool = True,
+    simulation: str | None = _SIMULATION,
     may_run: bool = False,
 ) -> tuple[Diagnostic, ...]:
     """Check a loaded system, the core beside its specification, and what its simulation reads; return the warnings.
 
-    Nothing is built, and the user's Python code is only read unless it `may_run`. Raise `InputError` with the faults of
-    all parts.
+    `simulation` is the core's target of the simulation, or None to check no core. Nothing is built, and the user's
+    Python code is only read unless it `may_run`. Raise `InputError` with the faults of all parts.
     """
     from fusesoc_firm.builds.check import check_core
     from fusesoc_firm.builds.setup.core_schema import check_loadable
@@ -132,7 +136,7 @@ def check_all(
     from fusesoc_firm.runs.simulation.software_run import system_stimuli
     from fusesoc_firm.system.message_sources import check_specs_of, core_of
 
-    core = core_of(spec) if with_core else None
+    core = core_of(spec) if simulation else None
     if core:
         check_loadable(Path(shown(core.path)))
     faults = Diagnostics()
@@ -147,9 +151,9 @@ def check_all(
         ethernet_node(loaded.system, loaded.libraries)
     # What the user's model prints is not part of the answer.
     with faults.noting(), redirect_stdout(sys.stderr):
-        if core:
-            check_core(core, may_run=may_run)
-        elif with_core:
+        if core and simulation:
+            check_core(core, simulation, may_run=may_run)
+        elif simulation:
             check_specs_of(spec.parent)
     faults.raise_if_any()
     return warnings

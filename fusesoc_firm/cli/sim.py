@@ -69,7 +69,7 @@ def _sim(arguments: argparse.Namespace) -> None:
     wishes = Wishes(arguments.tool or "", arguments.seed, arguments.waves, arguments.options)
     chosen = simulation(core, folder, wishes)
     with Progress("checking", is_shown=not arguments.quiet):
-        loaded = check_core_file(chosen.core_file, may_run=True)
+        loaded = check_core_file(chosen.core_file, chosen.build.target, may_run=True)
     report = _run(chosen, is_verbose=arguments.verbose, is_quiet=arguments.quiet)
     if not report.verdict:
         if not arguments.verbose:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.builds.setup.cores import solved
 from fusesoc_firm.builds.setup.outcome import Build
+from fusesoc_firm.builds.setup.sources import with_libraries
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.common import coloured
 from fusesoc_firm.cli.failed_build import print_errors
@@ -42,6 +44,25 @@ def test_a_faulty_accelerator_is_refused_before_the_build(capsys: Captured) -> N
     assert "img/rtl/img.v:9:22: error: port 'in_xx' is not in the interface" in error
     assert main(["system", "check", "img/img.yaml"]) == 1
     assert capsys.readouterr().err == error
+
+
+@pytest.mark.skipif(not shutil.which("iverilog"), reason="Icarus Verilog is not installed")
+def test_a_simulator_that_cannot_is_refused_before_the_build(capsys: Captured) -> None:
+    assert main(["init", "wide", "--in", "geometry_msgs/Point", "--out", "geometry_msgs/Point"]) == 0
+    spec = Path("wide/wide.yaml")
+    spec.write_text(spec.read_text(encoding="utf-8").replace("project:\n", "project:\n  idBytes: 2\n", 1))
+    assert main(["check", str(spec)]) == 0
+    assert main(["sim", str(spec), "--tool", "icarus"]) == 1
+    assert "error: icarus cannot simulate a system with 'idBytes: 2'" in capsys.readouterr().err
+    assert not [*Path("build").glob("robot_sys_wide_*")]
+
+
+def test_a_netlist_has_the_synchronisers_of_the_hardware() -> None:
+    """The accelerator is in Verilog, so the target `sim` simulates a netlist."""
+    fusesoc = with_libraries("robot:sys:img:0.1.0", Path("img"))
+    names = {str(core.name) for core, _ in solved(fusesoc, fusesoc.get_core("robot:sys:img:0.1.0"), "sim")}
+    assert "robot:cdc:firm_cdc_sync:0.2.0" in names
+    assert "robot:sim:firm_sim_sync:0.2.0" not in names
 
 
 def test_a_tools_messages_name_the_users_files(capsys: Captured) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from fusesoc_firm.tools.simulators import SIMULATORS
 from tests.compilers import verilated
 
 HEADERS = Path(__file__).parent
@@ -27,3 +28,14 @@ def compiled(
         command += ["-MAKEFLAGS", option]
     command += ["-Wno-INITIALDLY", "--top-module", top, "--Mdir", "model", "netlist.v", "bench.cpp"]
     return verilated(command, folder, "model", top, ["netlist.v", "bench.cpp"])
+
+
+def simulator(top: str, files: Sequence[Path], folder: Path) -> Path:
+    """The program that simulates the test bench `top`, with the options of the product. Raises `CompilerError`."""
+    options = [word for item in SIMULATORS["verilator"].options["verilator_options"] for word in item.split()]
+    command = ["verilator", "--cc", "--exe", "--build", *options]
+    for option in ("OPT_FAST=-O0", "OPT_SLOW=-O0", "OPT_GLOBAL=-O0"):
+        command += ["-MAKEFLAGS", option]
+    names = list(map(str, files))
+    command += ["--top-module", top, "--Mdir", "model", *names]
+    return verilated(command, folder, "model", top, names)

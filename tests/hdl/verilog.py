@@ -18,7 +18,15 @@ from tests.processes import limited
 from tests.recall import RunResult, digest_of_source, identity, ran, recalled
 from tests.system.simulated.systems import HARDWARE
 
-_HOST = ("firm_sim_host", "firm_sim_join", "firm_axis_checker", "firm_sim_link", "firm_sim_uart", "firm_sim_spi")
+_HOST = (
+    "firm_sim_host",
+    "firm_sim_join",
+    "firm_sim_clock",
+    "firm_axis_checker",
+    "firm_sim_link",
+    "firm_sim_uart",
+    "firm_sim_spi",
+)
 _INCLUDE = re.compile(r'`include\s+"([^"]+)"')
 HOST = tuple(CORES / "sim" / "rtl" / f"{name}.v" for name in _HOST)
 

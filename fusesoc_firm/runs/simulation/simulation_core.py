@@ -206,16 +206,11 @@ def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
 
 
 def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
-    """Raise `InputError` if the simulator does not support the language of an accelerator or several clocks.
+    """Raise `InputError` if the simulator does not support ids of two bytes or the language of an accelerator.
 
     The hint names the `target` of the default simulator.
     """
     known = SIMULATORS[simulator]
-    if not known.reads_vhdl and system.clocks:
-        fail(
-            f"{simulator} cannot simulate a system with several clocks",
-            hint=f"the additional clocks are generated in VHDL; use --target={target}",
-        )
     if system.id_bytes > 1 and not known.reads_vhdl:
         fail(
             f"{simulator} cannot simulate a system with 'idBytes: {system.id_bytes}'",

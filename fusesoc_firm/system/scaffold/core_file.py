@@ -277,7 +277,7 @@ def _call(instance: str, parameters: Mapping[str, str]) -> str:
 
 def _emulation(system: DerivedSystem) -> _Kind:
     """Return the target of `firm emulate`, which a system that cannot have a serial link does not have."""
-    has_netlist = not (system.clocks or system.kernels) and system.id_bytes == 1
+    has_netlist = not system.kernels and system.id_bytes == 1
     simulation = _call(_SIMULATION, {"product": "live", "simulator": EMULATING, **EMULATED})
     words = _generate(_call(_SYSTEM, EMULATED), simulation)
     target = _Target("emulate", words, f"{system.entity}_live", "verilog_pipe")
