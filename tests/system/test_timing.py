@@ -71,6 +71,15 @@ def test_a_message_without_bound_is_sent_for_nobody_knows_how_long(tmp_path: Pat
     assert times(tmp_path, "message: std_msgs/String, period: 500, wcet: 90").transfer_time == 90
 
 
+def test_a_limit_says_how_long_a_message_is_sent(tmp_path: Path) -> None:
+    text = "message: std_msgs/String, period: 500"
+    assert (
+        times(tmp_path, f"{text}, maxLength: 95").transfer_time == times(tmp_path, f"{text}, buffer: 95").transfer_time
+    )
+    assert times(tmp_path, f"{text}, maxLength: 95").transfer_time == frame_beats(95, 8)
+    assert times(tmp_path, f"{text}, maxLength: 95, wcet: 90").transfer_time == 90
+
+
 @pytest.mark.parametrize("policy", POLICIES)
 def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
     keys = ("period: 500", "period: 90, deadline: 80, wcet: 30")
@@ -171,6 +180,19 @@ def test_a_combined_scheduler(tmp_path: Path) -> None:
     generics = {item["formal"]: item["actual"] for item in text["scheduler_generics"]}
     assert (text["scheduler"], generics["TOP_POLICY"]) == ("firm_sched_combined", "firm.firm_sched_pkg.LRU")
     assert {"PERIODS", "DEADLINES", "TRANSFER_TIMES", "TIME_BITS", "SHORTEST_RUN"} < generics.keys()
+
+
+def test_only_the_publishers_of_a_group_need_its_times(tmp_path: Path) -> None:
+    groups = "groups: [{scheduler: lst, publishers: [p0]}, {scheduler: round_robin, publishers: [p1]}]"
+    text = "message: std_msgs/String"
+    combined = system(tmp_path, f"scheduler: lru, {groups}", f"{text}, period: 700, maxLength: 95", text)
+    constants = system_configuration(combined)["scheduler_times"]["constants"]
+    values = {item["name"]: [(value["cycles"], value["is_used"]) for value in item["values"]] for item in constants}
+    assert values == {
+        "PERIODS": [(700, True), (1, False)],
+        "DEADLINES": [(700, True), (1, False)],
+        "TRANSFER_TIMES": [(100, True), (1, False)],
+    }
 
 
 def test_fifos_for_late_frames(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ _LONGEST_RUN = 2**31 - 1
 
 # The hint for a publisher that lacks a time.
 _PERIOD = "add 'period: <cycles, time or rate>', such as 'period: 100 Hz'"
-_WCET = "add 'wcet: <cycles or time>', or 'buffer: <bytes of the longest payload>'"
+_WCET = "add 'wcet: <cycles or time>', or '{}: <bytes of the longest payload>'"
 
 # With ids of two bytes, `tree` chooses the policies.
 _IN_GROUPS = "round_robin", ("publishers are in groups by period, so those with short periods have more turns",)
@@ -73,8 +73,9 @@ def scheduling_of(
     policy, reasons = str(project.scheduler), tuple[str, ...]()
     groups = groups_of(project, publishers, faults)
     _check_shortest_run(project, faults)
-    for name in dict.fromkeys([group.policy for group in groups] or [policy]):
-        _check_complete(name, [blocks[item.block] for item in publishers], times, faults)
+    known = {item.block: found for item, found in zip(publishers, times, strict=True)}
+    for name, members in [(group.policy, group.blocks) for group in groups] or [(policy, tuple(known))]:
+        _check_complete(name, [(blocks[item], known[item]) for item in members if item in known], faults)
     if policy == AUTO_SCHEDULER and project.id_bytes > ONE_BYTE:
         policy, reasons = _IN_GROUPS
     elif policy == AUTO_SCHEDULER:
@@ -178,12 +179,12 @@ def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
         faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, f"legal here: 1 to {_LONGEST_RUN} beats")
 
 
-def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
-    """Note every time that a policy requires and a publisher lacks."""
+def _check_complete(policy: str, publishers: Iterable[tuple[Block, PublisherTimes]], faults: Diagnostics) -> None:
+    """Note every time that a policy requires and one of its publishers lacks."""
     is_auto = policy == AUTO_SCHEDULER
     has_deadlines = not is_auto and POLICIES[policy].has_deadlines
     has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
-    for block, item in zip(blocks, times, strict=True):
+    for block, item in publishers:
         # Faults in unreadable blocks are already noted.
         if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
@@ -192,7 +193,8 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
             faults.error(message, block.name.source, _PERIOD)
         if has_transfer_times and item.transfer_time is None and block.wcet is None:
             message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose message has no size limit"
-            faults.error(message, block.name.source, _WCET)
+            # The key 'maxLength' of a service or an action limits the messages to the hardware.
+            faults.error(message, block.name.source, _WCET.format("buffer" if block.service_block else "maxLength"))
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,11 @@ class _Reader:
 
 
 def _beats_at_most(publisher: Converter, project: Project) -> int | None:
-    """Return the number of beats in a publisher's longest frame, or None if its size is unbounded."""
-    longest = publisher.buffer or length_of(publisher.frame).maximum
-    return None if longest is None else frame_beats(longest, project.width, project.id_bytes)
+    """Return the number of beats in a publisher's longest frame, or None if its size is unbounded.
+
+    The default of `maxLength` is no bound: it is far above the size of most messages.
+    """
+    given = None if publisher.has_default_length else publisher.max_length
+    limits = (publisher.buffer or None, given, length_of(publisher.frame).maximum)
+    known = [limit for limit in limits if limit is not None]
+    return frame_beats(min(known), project.width, project.id_bytes) if known else None

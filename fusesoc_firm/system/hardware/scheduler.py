@@ -102,11 +102,11 @@ def _runs(values: Iterable[int]) -> list[dict[str, int]]:
 
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:
-    """Return a constant with a time for each publisher."""
+    """Return a constant with a time for each publisher; those of groups that do not need it have any legal one."""
     return {
         "name": name,
         "values": [
-            {"id": number, "cycles": value, "block": publisher.block}
+            {"id": number, "cycles": value or 1, "block": publisher.block, "is_used": value is not None}
             for number, (value, publisher) in enumerate(zip(cycles, system.publishers, strict=True))
         ],
     }
