@@ -17,7 +17,9 @@ _DRIVER = re.compile(r".* <- (?:.*\{n(\d+)w(\d+)\})?")
 _PORT = re.compile(r"(input|output) (.*?)(?:\[(?:(\d+):0|(\?))\])?;")
 _INSTANCE = re.compile(r"instance (.*?)\{i\d+\}: (.*)")
 # The instances' inputs already determine the readers of each net.
-_NOT_NEEDED = ("connect ", "attribute ")
+_NOT_NEEDED = "connect "
+# All values have quotation marks.
+_ATTRIBUTE = re.compile(r'attribute (\S+) of .* := "(.*)";')
 _MODULE = re.compile(r"module \{m\d+\} (.*)")
 _LOCATION = re.compile(r"# (.*:\d+:\d+)")
 
@@ -44,6 +46,7 @@ class _Reader:
         self._instance: Instance | None = None
         self._module: Module | None = None
         self._location = ""
+        self._attributes: dict[str, str] = {}
 
     def line(self, line: str) -> None:
         """Read the next line."""
@@ -54,8 +57,8 @@ class _Reader:
             self._begin_module(depth, text)
         elif word == "instance":
             self._begin_instance(self._stack[depth - 1], text)
-        elif word == "#":
-            self._location = _matched(_LOCATION, text)[1]
+        elif word in {"#", "attribute"}:
+            self._note(text)
         elif word == "parameter":
             self._stack[-1].parameters.append(_name(text.split()[1].rstrip(":")))
         elif word == "parameters" and self._instance:
@@ -72,6 +75,14 @@ class _Reader:
         elif text:
             raise ValueError(text)
 
+    def _note(self, text: str) -> None:
+        """Note the place of the next instance, or an attribute of it."""
+        if text.startswith("#"):
+            self._location = _matched(_LOCATION, text)[1]
+        else:
+            name, value = _matched(_ATTRIBUTE, text).groups()
+            self._attributes[name] = value
+
     def _begin_module(self, depth: int, text: str) -> None:
         name = _matched(_MODULE, text)[1]
         # The dollar sign distinguishes a gate from a user's module.
@@ -87,8 +98,9 @@ class _Reader:
 
     def _begin_instance(self, module: Module, text: str) -> None:
         name, kind = _matched(_INSTANCE, text).groups()
-        instance = Instance(_name(name), kind if kind.startswith("$") else _name(kind), self._location)
-        self._location = ""
+        kind = kind if kind.startswith("$") else _name(kind)
+        instance = Instance(_name(name), kind, self._location, attributes=self._attributes)
+        self._location, self._attributes = "", {}
         self._instance = instance
         self._module = None
         if instance.kind == module.name:

@@ -40,7 +40,8 @@ class Port:
 class Instance:
     """A gate (`kind` begins with `$`) or an instance of a module.
 
-    An undriven input is None. `location` is the place in the VHDL as `file:line:column`, or empty.
+    An undriven input is None. `location` is the place in the VHDL as `file:line:column`, or empty. `attributes` are
+    those of the signal that became this gate, as text.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Instance:
     parameters: Sequence[str] = ()
     inputs: list[Net | None] = field(default_factory=list)
     outputs: Sequence[Net] = ()
+    attributes: Mapping[str, str] = field(default_factory=dict)
 
     def error(self, message: str) -> NetlistError:
         """Return an error with this instance's place in the VHDL."""

@@ -52,6 +52,8 @@ _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # GHDL's messages that mean missing logic, worded as in GHDL's sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
+_EXPECTED = ("is not bound", "(in default configuration", "unhandled attribute")
+
 _CRASH = "GHDL Bug occurred"
 # The places where GHDL crashes, with the input that causes each crash; the line of a file is that of GHDL 2.0.
 _OF_TABLES = ("netlists.adb:774", "STORAGE_ERROR")
@@ -449,11 +451,9 @@ def _kind(error: str) -> type[NetlistError]:
 
 
 def _other_warnings(text: str) -> str:
-    """Return GHDL's warnings, except those about components without an entity."""
+    """Return GHDL's warnings, except those about components without an entity, and about attributes for other tools."""
     kept = [
-        item
-        for item in _messages(text)
-        if ":warning:" in item[0] and "is not bound" not in item[0] and "(in default configuration" not in item[0]
+        item for item in _messages(text) if ":warning:" in item[0] and not any(part in item[0] for part in _EXPECTED)
     ]
     return "\n".join(line for item in kept for line in item)
 

@@ -62,6 +62,8 @@ _WIRES = frozenset({"$signal", "$isignal", "$output", "$ioutput", "$port", "$nop
 _SIGNALS = frozenset({"$signal", "$isignal"})  # their nets have the same names, without a suffix
 _EDGES = {"$posedge": "posedge", "$negedge": "negedge"}
 _MEMORIES = frozenset({"$memory", "$memory_init"})
+# The attributes with which VHDL tells synthesis how to build a memory; their values are texts.
+_OF_MEMORIES = frozenset({"ram_style", "ramstyle", "syn_ramstyle", "rw_addr_collision"})
 _MEMORY_PORTS = frozenset({"$mem_rd", "$mem_rd_sync", "$mem_wr_sync"})
 _REGISTERS = frozenset({"$dff", "$idff", "$adff", "$iadff"})
 # These gates serve formal verification and are not hardware.
@@ -97,6 +99,12 @@ def literal(bits: str) -> str:
 def declaration(width: int) -> str:
     """Return the range in a declaration, followed by a blank, or an empty string for one bit."""
     return f"[{width - 1}:0] " if width > 1 else ""
+
+
+def memory_attributes(memory: Instance) -> str:
+    """Return the attributes in front of a memory's declaration, followed by a blank, or an empty string."""
+    known = [f'{name} = "{value}"' for name, value in memory.attributes.items() if name in _OF_MEMORIES]
+    return f"(* {', '.join(known)} *) " if known else ""
 
 
 def constant(gate: Instance) -> str | None:
@@ -534,7 +542,7 @@ class _Writer:
 
     def _memory_declaration(self, memory: Instance) -> Iterator[str]:
         width, depth = self._memory_size(memory)
-        yield f"  reg {declaration(width)}{self.labels[id(memory)]} [0:{depth - 1}];"
+        yield f"  {memory_attributes(memory)}reg {declaration(width)}{self.labels[id(memory)]} [0:{depth - 1}];"
 
     def _memory(self, memory: Instance) -> Iterator[str]:
         name = self.labels[id(memory)]

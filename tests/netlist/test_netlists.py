@@ -83,6 +83,33 @@ def test_a_package_brings_signed_numbers_to_a_file_that_does_not_name_them(tmp_p
     assert len(re.findall(r"= 8'h[53] - \w+;", output.read_text())) == 2
 
 
+_MEMORY = """library ieee; use ieee.std_logic_1164.all; use ieee.numeric_std.all;
+entity ram is port (clk, write : in std_logic; written, read, x : in std_logic_vector(7 downto 0);
+  y : out std_logic_vector(7 downto 0)); end;
+architecture rtl of ram is
+  type words_t is array (natural range 0 to 255) of std_logic_vector(7 downto 0);
+  signal words : words_t;
+  attribute syn_ramstyle : string;
+  attribute mark : string;
+  attribute mark of words : signal is "read by no tool";
+  attribute syn_ramstyle of words : signal is "no_rw_check";
+begin
+  process (clk) begin if rising_edge(clk) then
+    if write = '1' then words(to_integer(unsigned(written))) <= x; end if;
+    y <= words(to_integer(unsigned(read)));
+  end if; end process;
+end;
+"""
+
+
+def test_a_memory_keeps_its_attributes_for_synthesis(tmp_path: Path) -> None:
+    source, output = tmp_path / "ram.vhd", tmp_path / "ram.v"
+    source.write_text(_MEMORY)
+    assert not translate(Translation("ram", str(output), {"work": [str(source)]}, {}), tmp_path / "ghdl")
+    (line,) = [line for line in output.read_text().splitlines() if "[0:255]" in line]
+    assert line == '  (* syn_ramstyle = "no_rw_check" *) reg [7:0] words [0:255];'
+
+
 def test_an_error_has_its_place_in_the_source(tmp_path: Path) -> None:
     """Behind what a copy of the source has in addition, and behind tabs too."""
     source = tmp_path / "first.vhd"
