@@ -23,12 +23,19 @@ from typing import Any
 
 import yaml
 
+from fusesoc_firm.netlist import dump, verilog
+from fusesoc_firm.netlist.model import Modules
 from tests.hdl.analyses import Source, analyses_in, as_they_were
 from tests.processes import limited
 from tests.recall import RunResult, identity, ran, recalled
 
 # GHDL 2.0 writes some constants of more than 32 bits to Verilog as in VHDL, where they would be texts of ASCII.
 _LONG_CONSTANT = re.compile(r'"([01xzXZ]{33,})"')
+
+_MODULE = re.compile(r"^module (\w+).*?^endmodule$", re.MULTILINE | re.DOTALL)
+_MEMORY = re.compile(r"^  (?=reg (?:\[\d+:0\] )?(\w+)\[\d+:0\])", re.MULTILINE)
+# In the VHDL of a memory with an attribute.
+_DECLARED = b"attribute syn_ramstyle of"
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 CORES = REPOSITORY / "cores"
@@ -131,7 +138,12 @@ class Library:
     def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
         """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
         netlist = self.netlist_of_ghdl(entity, generics, language)
-        return _LONG_CONSTANT.sub(_constant, netlist) if language == "verilog" else netlist
+        if language != "verilog":
+            return netlist
+        sources = analyses_in(self.directory).sources(self.name.lower(), [entity])
+        if any(_DECLARED in source.path.read_bytes() for source in sources):
+            netlist = _with_attributes(netlist, dump.read(self.netlist_of_ghdl(entity, generics, "dump")))
+        return _LONG_CONSTANT.sub(_constant, netlist)
 
     def netlist_of_ghdl(self, entity: str, generics: Mapping[str, Generic] | None, language: str) -> str:
         """The same netlist, with the faults of GHDL's text."""
@@ -242,6 +254,16 @@ def _in_order(netlist: str) -> str:
     for name in units:
         place(name)
     return "".join([*ordered.values(), *last])
+
+
+def _with_attributes(netlist: str, modules: Modules) -> str:
+    """GHDL's Verilog with the attributes of memories, which are only in GHDL's dump of the same netlist."""
+
+    def declared(module: re.Match[str]) -> str:
+        of_gates = {gate.name: verilog.memory_attributes(gate) for gate in modules[module[1]].instances}
+        return _MEMORY.sub(lambda memory: f"  {of_gates.get(memory[1], '')}", module[0])
+
+    return _MODULE.sub(declared, netlist)
 
 
 def _is_complete(case: str) -> bool:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.hdl.ghdl import CORES
 from tools.proofs import document, smtbmc
 from tools.proofs.all import PROOFS
+from tools.proofs.collisions import with_collisions
 from tools.proofs.proof import Mutation, MutationError, Proof
 from tools.proofs.smtbmc import Task
 
@@ -66,6 +68,51 @@ def _counter(**limits: int) -> Task:
 def test_every_property_has_its_mutation(proof: Proof) -> None:
     violated = [label for mutation in proof.mutations for label in mutation.violates]
     assert {*violated} == {*proof.properties}
+
+
+def test_every_memory_without_collisions_is_proved() -> None:
+    """Also, no other memory is declared as one."""
+    declared = {file.stem for file in CORES.rglob("*.vhd") if b'signal is "no_rw_check"' in file.read_bytes()}
+    assert declared == {proof.entity for proof in PROOFS if proof.harness == "collisions"}
+
+
+# A word of a memory that is written and read at the same address in each cycle.
+_COLLIDING = """module ram (input clk, input d, output reg q);
+  (* syn_ramstyle = "no_rw_check", rw_addr_collision = "no" *) reg memory[1:0] ; // memory
+  always @(posedge clk)
+      q <= memory[1'b0];
+  always @(posedge clk)
+    if (write)
+      memory[1'b0] <= d;
+  wire write = 1;
+endmodule
+"""
+_READER = """module reader (input clk);
+  reg after = 0;
+  wire q;
+  always @(posedge clk) after <= 1;
+  ram dut (.clk(clk), .d(1'b0), .q(q));
+  (* hierconn *) wire \\dut.collides ;
+  always @* always_collides: assert (\\dut.collides );
+  reg two = 0;
+  always @(posedge clk) two <= after;
+  always @* reads_zero: assert (!two || !q);
+endmodule
+"""
+
+
+@pytest.mark.check
+@needs_solver
+def test_a_colliding_read_gives_any_word(tmp_path: Path) -> None:
+    outcomes = {}
+    for name, netlist in {
+        "plain": _COLLIDING.replace("endmodule", "wire collides = 1;\nendmodule"),
+        "free": with_collisions(_COLLIDING),
+    }.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        outcomes[name] = Task("reader.sv", {"reader.sv": _READER, "netlist.v": netlist}).check(folder, 5).failed
+    assert outcomes == {"plain": (), "free": ("reads_zero",)}
 
 
 @pytest.mark.parametrize(

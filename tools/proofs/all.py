@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from tools.proofs import manager, parts, schedulers
+from tools.proofs import manager, memories, parts, schedulers
 
-PROOFS = (*manager.PROOFS, *parts.PROOFS, *schedulers.PROOFS)
+PROOFS = (*manager.PROOFS, *parts.PROOFS, *memories.PROOFS, *schedulers.PROOFS)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tests.hdl.ghdl import Generic, Library, core_files
 from tools.bench.designs import Converter, write_converter
+from tools.proofs.collisions import with_collisions
 from tools.proofs.smtbmc import Outcome, Task
 
 HARNESSES = Path(__file__).parent / "harness"
@@ -100,7 +101,7 @@ class Proof:
     def _task(self, files: Sequence[Path], size: Size, folder: Path) -> Task:
         library = Library("firm", folder)
         library.analyse(files)
-        netlist = library.synthesise(self.entity, size, "verilog")
+        netlist = with_collisions(library.synthesise(self.entity, size, "verilog"))
         generics = {name: int(value) for name, value in size.items()}
         choices = {f"{name}_{value}": 1 for name, value in generics.items()}
         defines = {**self.defines, **generics, **choices}

@@ -99,6 +99,10 @@ architecture rtl of firm_axis_length_buffer is
     return index + 1;
   end function next_index;
 
+  -- A write needs room and a read needs a beat, so they never have the same address.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
+
 begin
 
   assert is_stream_width(WIDTH)

@@ -8,6 +8,11 @@ use ieee.std_logic_1164.all;
 
 package firm_axis_pkg is
 
+  -- What synthesis reads of a memory whose reads never meet a write of their address, or do not matter then. With the
+  -- values "no_rw_check" and "no" it adds no logic for such a cycle. tools/proofs shows for each memory that it may.
+  attribute syn_ramstyle      : string;  -- Quartus, Synplify, Lattice's LSE and Yosys
+  attribute rw_addr_collision : string;  -- Vivado (UG901)
+
   function max(left, right : integer) return integer;
 
   -- The number of bits to distinguish `values` items: 0 for 1, 1 for 2, 8 for 256.

@@ -142,6 +142,10 @@ architecture rtl of firm_axis_queue is
     return count;
   end function counted;
 
+  -- A frame leaves after it has arrived, from a place that no other frame has.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
+
 begin
 
   assert is_stream_width(WIDTH)

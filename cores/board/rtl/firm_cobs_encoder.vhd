@@ -63,6 +63,10 @@ architecture rtl of firm_cobs_encoder is
   signal coded_r : byte_t;
   signal valid_r : std_logic;
 
+  -- Bytes that can leave lie between the read place and that of the next code; writes are beyond.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
+
 begin
 
   assert DEPTH >= 512 and DEPTH <= 32768 and 2**PLACE_BITS = DEPTH

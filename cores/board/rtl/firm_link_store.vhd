@@ -81,6 +81,10 @@ architecture rtl of firm_link_store is
   signal word_r  : std_logic_vector(8 downto 0);
   signal valid_r : std_logic;
 
+  -- Bytes that can leave lie between the read place and the incoming frame; writes are beyond.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
+
 begin
 
   assert LONGEST >= 1 and LONGEST <= 1048576

@@ -54,6 +54,10 @@ architecture rtl of firm_mac_store is
   signal word_r   : std_logic_vector(DATA_BITS downto 0);
   signal valid_r  : std_logic;
 
+  -- Bytes that can leave lie between the read place and the incoming frame; writes are beyond.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
+
 begin
 
   assert DEPTH >= 4 and 2**clog2(DEPTH) = DEPTH

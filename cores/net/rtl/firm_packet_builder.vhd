@@ -145,6 +145,12 @@ architecture rtl of firm_packet_builder is
     return std_logic_vector(resize(number(NUMBER_BITS-1 downto 8), 8));
   end function high_byte;
 
+  -- A packet's fields are not written while it is built. firm_axis_pkg tells about these attributes.
+  attribute syn_ramstyle      : string;
+  attribute rw_addr_collision : string;
+  attribute syn_ramstyle of fields      : signal is "no_rw_check";
+  attribute rw_addr_collision of fields : signal is "no";
+
 begin
 
   assert ADDRESS_BITS >= 4 and ADDRESS_BITS <= 16
@@ -254,7 +260,7 @@ begin
       if field_valid = '1' then
         fields(to_integer(unsigned(field_bank) & unsigned(field_address))) <= field_data;
       end if;
-      if advance = '1' then
+      if moves = '1' then
         field_r <= fields(to_integer(unsigned(bank_r) & unsigned(argument(FIELD_BITS-1 downto 0))));
       end if;
     end if;

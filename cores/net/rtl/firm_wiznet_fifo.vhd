@@ -4,6 +4,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_wiznet_fifo is
   port (
@@ -45,6 +47,10 @@ architecture rtl of firm_wiznet_fifo is
   signal ready : std_logic;
   signal entry : std_logic;                              -- an end enters
   signal leave : std_logic;                              -- an end leaves
+
+  -- A write needs room and a read needs a byte, so they never have the same address.
+  attribute syn_ramstyle of memory_r      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory_r : signal is "no";
 
 begin
 

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The memory of frames; the lists of places are read without a clock.
+localparam BITS = $clog2(`FRAMES * `BEATS);
+
+(* anyseq *) wire s_axis_tvalid;
+(* anyseq *) wire s_axis_tlast;
+(* anyseq *) wire m_axis_tready;
+
+firm_axis_queue dut (
+    .clk(clk),
+    .rst_n(rst_n),
+    .s_axis_tdata({`WIDTH{1'b0}}),
+    .s_axis_tkeep({`WIDTH/8{1'b1}}),
+    .s_axis_tuser(1'b0),
+    .s_axis_tvalid(s_axis_tvalid),
+    .s_axis_tlast(s_axis_tlast),
+    .m_axis_tready(m_axis_tready));
