@@ -63,7 +63,6 @@ REASONS = {
                 "_assertion",
                 "_register",
                 "_with_reset",
-                "_memory_declaration",
                 "_clocked",
                 "_action",
                 "_contents",
