@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.accelerator.unit import Libraries, Unit, place
+from fusesoc_firm.accelerator.unit import Libraries, Unit, lines_of, place
 from fusesoc_firm.netlist.instantiated import Entity, entities, integer
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
 from fusesoc_firm.tools.library_path import library_root
@@ -67,30 +67,38 @@ class Instances:
                 f"'{kind}' is an entity in VHDL, so its ports are connected by name", source, "write .port(net)"
             )
             return
+        count = len(faults.found)
         values: dict[str, int] = {}
         for name, value in cell["parameters"].items():
-            if name not in entity.generics:
-                faults.error(f"'{kind}' has no parameter '{name}'", source, _legal(name, entity.generics))
+            if not (generic := entity.generics.get(name)):
+                message = f"'{kind}' has no parameter '{name}'"
+                faults.error(message, _named(name, source), _legal(name, entity.generics))
             elif (number := integer(str(value))) is not None:
                 values[name.lower()] = number
-        if unit := self.entity(entity.path, kind, values):
+            elif generic.type != "string":
+                form = "1 for true, and 0 for false," if generic.type == "boolean" else "the number"
+                message = f"parameter '{name}' of '{kind}' is a {generic.type}, not a text"
+                faults.error(message, _named(name, source), f"write {form} without quotation marks")
+        # The sizes of ports depend on the parameters.
+        if count == len(faults.found) and (unit := self.entity(entity.path, kind, values)):
             self._compare_ports(unit, entity, cell, source, faults)
 
     def _compare_ports(
         self, unit: Unit, entity: Entity, cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics
     ) -> None:
         ports = {entity.spelt(port.name): port for port in unit.ports}
+        meant = {closest(name, ports) for name in cell["connections"] if name not in ports}
         for name, bits in cell["connections"].items():
             if not (port := ports.get(name)):
-                faults.error(f"'{unit.name}' has no port '{name}'", source, _legal(name, ports))
+                faults.error(f"'{unit.name}' has no port '{name}'", _named(name, source), _legal(name, ports))
             elif bits and port.bits is not None and len(bits) != port.bits:
                 parameters = ", ".join(entity.generics)
                 hint = f"the parameters {parameters} select the size" if parameters else ""
                 message = f"port '{name}' of '{unit.name}' has {port.bits} bits here, and is connected to {len(bits)}"
-                faults.error(message, source, hint)
+                faults.error(message, _named(name, source), hint)
         # In the netlist, an input has no default value.
         is_open = {name: port.direction == "in" and not cell["connections"].get(name) for name, port in ports.items()}
-        if absent := [f"'{name}'" for name in ports if is_open[name]]:
+        if absent := [f"'{name}'" for name in ports if is_open[name] and name not in meant]:
             what = f"input {absent[0]}" if len(absent) == 1 else f"inputs {', '.join(absent[:-1])} and {absent[-1]}"
             verb, it = ("is", "it") if len(absent) == 1 else ("are", "them")
             faults.error(f"{what} of '{unit.name}' {verb} not connected", source, f"connect {it}")
@@ -111,7 +119,21 @@ def _compare_names(module: Mapping[str, Any], cell: Mapping[str, Any], source: S
     for port in cell["connections"]:
         # Ports that are connected by position have numbers.
         if port not in module["ports"] and not port.startswith("$"):
-            faults.error(f"'{name}' has no port '{port}'", source, _legal(port, module["ports"]))
+            faults.error(f"'{name}' has no port '{port}'", _named(port, source), _legal(port, module["ports"]))
+
+
+def _named(name: str, instance: SourceRef) -> SourceRef:
+    """Return the place of a parameter's or port's name in the statement of an instance, or else the instance's."""
+    path = Path(instance.file)
+    lines = lines_of(path)
+    position = sum(len(line) + 1 for line in lines[: instance.line - 1]) + instance.column - 1
+    text = "\n".join(lines)
+    begin, end = text.rfind(";", 0, position) + 1, text.find(";", position)
+    found = re.compile(rf"\.\s*({re.escape(name)})\s*\(").search(text, begin, end)
+    if not found:
+        return instance
+    line, column = text.count("\n", 0, found.start(1)), found.start(1) - text.rfind("\n", 0, found.start(1))
+    return place(path, line + 1, column, len(name), lines)
 
 
 def _legal(name: str, names: Iterable[str]) -> str:

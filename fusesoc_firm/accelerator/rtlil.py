@@ -10,6 +10,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from fusesoc_firm.accelerator.sources import Fault
+
 # One bit of a wire.
 Bit = tuple[str, int]
 
@@ -130,24 +132,18 @@ def _sliced(bits: list[Bit], following: str) -> list[Bit]:
     return bits[int(match[2] or high) : high + 1]
 
 
-def source_faults(modules: dict[str, Module], top: str) -> Iterator[tuple[Wire, str, str]]:
-    """Yield the signals of a module with wrong sources, each with a message and a hint.
-
-    The hint is empty for outputs without a source, which the simulation may not need.
-    """
+def source_faults(modules: dict[str, Module], top: str) -> Iterator[tuple[Wire, Fault]]:
+    """Yield the signals of a module with wrong sources."""
     module = modules.get(top)
     if module is None:
         return
     found, unknown = sources(modules, top)
     for wire in module.wires.values():
-        name = wire.name.removeprefix("\\")
         if wire.name[0] != "\\":
             continue
         if wire.direction == "input" and any(found[bit] for bit in wire.bits):
-            yield wire, f"'{name}' is an input, and is assigned", "the value comes from outside; remove the assignment"
+            yield wire, Fault.INPUT
         elif any(found[bit] > 1 for bit in wire.bits) and not (wire.is_signed and wire.width == _INTEGER_BITS):
-            hint = "keep one source: an 'assign', an 'always' block or an output of an instance; remove the others"
-            yield wire, f"'{name}' has more than one source", hint
+            yield wire, Fault.SEVERAL
         elif wire.direction == "output" and any(not found[bit] and bit not in unknown for bit in wire.bits):
-            is_part = any(found[bit] for bit in wire.bits)
-            yield wire, f"{'a part of ' if is_part else ''}output '{name}' has no source", ""
+            yield wire, Fault.PART if any(found[bit] for bit in wire.bits) else Fault.NONE

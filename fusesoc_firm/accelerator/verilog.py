@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.accelerator.instances import Instances
 from fusesoc_firm.accelerator.rtlil import read_modules, source_faults
+from fusesoc_firm.accelerator.sources import report_sources
 from fusesoc_firm.accelerator.unit import Unit, UnitPort, lines_of, place
-from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
 from fusesoc_firm.tools.yosys import Yosys, is_system_verilog, source_place
 
 _ERROR = re.compile(r"(?P<file>.+?):(?P<line>\d+): ERROR: (?P<text>.+)")
@@ -69,8 +70,7 @@ class VerilogReader:
     def _warn(self, output: str, faults: Diagnostics) -> None:
         for line in output.splitlines():
             if match := _IMPLICIT.match(line):
-                hint = "an undeclared name is a wire of 1 bit; declare it, or correct its name"
-                faults.warn(f"'{match['name']}' is not declared", _line(match), hint)
+                _report_undeclared(match["name"], _line(match), faults)
             elif match := _RANGE.match(line):
                 bits = match["range"] or "selected here"
                 hint = "select bits of the declared range"
@@ -95,12 +95,9 @@ class VerilogReader:
             hint = "assign it in every branch of its block, or only at a clock edge"
             faults.warn(f"latch inferred for '{match['name']}': some branch does not assign it", source, hint)
         modules = read_modules(text)
-        for wire, message, hint in source_faults(modules, f"\\{top}"):
-            source = _declared({"src": wire.place}, paths[0], len(wire.name) - 1)
-            if hint:
-                faults.error(message, source, hint)
-            else:
-                faults.warn(message, source, "assign it a value")
+        for wire, fault in source_faults(modules, f"\\{top}"):
+            name = wire.name.removeprefix("\\")
+            report_sources(name, _declared({"src": wire.place}, paths[0], len(name)), fault, faults)
 
     def _report(self, output: str, paths: Sequence[Path], faults: Diagnostics) -> None:
         """Report Yosys' error, except in SystemVerilog, which simulators support better than Yosys."""
@@ -141,6 +138,21 @@ def _line(match: re.Match[str]) -> SourceRef:
     return place(Path(match["file"]), int(match["line"]), 0)
 
 
+def _report_undeclared(name: str, source: SourceRef, faults: Diagnostics) -> None:
+    """Add an undeclared name, which Verilog takes for a wire of 1 bit.
+
+    If the name only connects instances, this is legal, and a warning.
+    """
+    code = [_COMMENT.sub("", line) for line in lines_of(Path(source.file))]
+    uses = re.findall(rf"(\(\s*)?\b{re.escape(name)}\b(\s*\))?", "\n".join(code))
+    near = closest(name, {word for line in code for word in re.findall(r"\b[A-Za-z_]\w*", line)} - {name})
+    hint = f"did you mean '{near}'?" if near else "declare it: an undeclared name is a wire of 1 bit"
+    report = faults.warn if all(map(all, uses)) else faults.error
+    if found := re.search(rf"\b{re.escape(name)}\b", source.text):
+        source = replace(source, column=found.start() + 1, width=len(name))
+    report(f"'{name}' is not declared", source, hint)
+
+
 def _syntax_fault(text: str, path: Path, line: int) -> tuple[str, SourceRef, str]:
     """Return a message of Yosys' parser with its place and its probable cure."""
     lines = lines_of(path)
@@ -150,7 +162,7 @@ def _syntax_fault(text: str, path: Path, line: int) -> tuple[str, SourceRef, str
         return text, place(path, last, 0, lines=lines), "an 'endmodule' or a 'begin' without 'end' is missing above"
     source = place(path, line, 0, lines=lines)
     if not found:
-        return text, source, ""
+        return text, source, "connect all by name: '.port(net)'" if text.startswith("Mix of positional") else ""
     code = _COMMENT.sub("", source.text)
     token = found["token"].strip("'")
     if word := re.search(rf"\b{token}\b", code) if token.isalpha() else None:
@@ -159,6 +171,8 @@ def _syntax_fault(text: str, path: Path, line: int) -> tuple[str, SourceRef, str
         return text, source, f"'{system[1]}' is SystemVerilog, whose files end in .sv: rename {path.name}"
     if found["expected"] == "';'" or token == "endmodule":
         return text, source, "is a ';' or an 'end' missing above?"
+    if token == "<=" and "assign" in code:
+        return text, source, "write '=': an 'assign' has no '<=', which is for 'always' blocks"
     if token in ("=", "<=") and "if" not in code:
         return text, source, "write 'assign' before it, or put it into an 'always' block"
     return text, source, "is a ';' or an 'end' missing above?" if word else ""

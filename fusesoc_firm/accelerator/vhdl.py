@@ -17,8 +17,9 @@ from functools import cached_property
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
+from fusesoc_firm.accelerator.sources import Fault, report_sources
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
-from fusesoc_firm.accelerator.vhdl_hints import hint, is_at_end, is_syntax, is_unanalysed, missing_clause
+from fusesoc_firm.accelerator.vhdl_hints import hint, is_at_end, is_generate, is_syntax, is_unanalysed, missing_clause
 from fusesoc_firm.netlist import dump
 from fusesoc_firm.netlist.corrections import lost_latches
 from fusesoc_firm.netlist.instantiated import Entity, entities
@@ -177,16 +178,14 @@ class VhdlReader:
         lines = dict.fromkeys(done.stderr.splitlines())
         self._report_latches(done, paths, faults)
         is_connected = not self._report_lengths(lines, paths, faults)
-        several = "keep one source: an assignment, a process or an output of an instance; remove the others"
-        for pattern, report, message, cure in (
-            (_TWO_SOURCES, faults.error, "'{}' has more than one source", several),
-            (_NO_SOURCE, faults.warn, "output '{}' has no source", "assign it a value"),
-        ):
-            for match in filter(None, map(pattern.match, lines)):
-                # GHDL drops an assignment of a wrong length.
-                if Path(match["file"]) in paths and (is_connected or pattern is not _NO_SOURCE):
-                    source = place(Path(match["file"]), int(match["line"]), int(match["column"]), len(match["name"]))
-                    report(message.format(match["name"]), source, cure)
+        for match in (_TWO_SOURCES.match(line) or _NO_SOURCE.match(line) for line in lines):
+            if not match or (path := Path(match["file"])) not in paths:
+                continue
+            source = place(path, int(match["line"]), int(match["column"]), len(match["name"]))
+            # GHDL drops an assignment of a wrong length.
+            if is_connected or match.re is _TWO_SOURCES:
+                fault = Fault.SEVERAL if match.re is _TWO_SOURCES else Fault.NONE
+                report_sources(match["name"], source, fault, faults)
 
     def _report_lengths(self, lines: Iterable[str], paths: Sequence[Path], faults: Diagnostics) -> bool:
         """Add lengths that differ, and return whether there are any."""
@@ -300,8 +299,8 @@ def _messages(output: str) -> Iterator[_Message]:
 def _without_consequences(found: Sequence[_Message]) -> Iterator[_Message]:
     """Yield messages without those that follow from an earlier one.
 
-    These are further faults in the syntax of a line or at the file's end, further names of a missing package, whose
-    types have no operators, and the architecture of an entity with faults.
+    These are further faults in the syntax of a line, after a statement outside a process or at the file's end, further
+    names of a missing package, whose types have no operators, and the architecture of an entity with faults.
     """
     lines: set[tuple[str, int]] = set()
     clauses: set[str] = set()
@@ -311,7 +310,7 @@ def _without_consequences(found: Sequence[_Message]) -> Iterator[_Message]:
         if is_syntax(message.text):
             follows = is_ended or line in lines or (is_at_end(message.text) and bool(lines))
             lines.add(line)
-            is_ended |= is_at_end(message.text)
+            is_ended |= is_at_end(message.text) or is_generate(message.text)
         else:
             follows = clause in clauses or (bool(clauses) and message.text.startswith("no function declarations"))
             follows |= is_unanalysed(message.text) and message is not found[0]

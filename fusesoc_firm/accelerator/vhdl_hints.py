@@ -12,7 +12,10 @@ _STANDARD = "write 'standard: 2008' for this accelerator in the specification"
 # Beginnings of messages about the syntax, of which those after the first in a line follow from it.
 _SYNTAX = re.compile(
     r".* expected\b|missing |[\"']end[\"'] must be followed by|unexpected |extra |misspelling"
-    r"|end label for an unlabeled"
+    r"|end label for an unlabeled|(?:a|else) generate "
+)
+_GENERATE = re.compile(
+    r"a generate statement must have a label|else generate not allowed|[\"']generate[\"'] is expected"
 )
 _AT_END = re.compile(r"unexpected end of file|.*instead of end of file")
 _UNANALYSED = re.compile(r"entity [\"']\w+[\"'] was not analysed")
@@ -51,6 +54,12 @@ _HINTS = tuple(
             r"[\"']end[\"'] must be followed by [\"'](\w+)",
             "an 'end {0};' is missing above: each 'if', 'case', 'loop' and 'process' has its own",
         ),
+        (
+            _GENERATE.pattern,
+            "'if', 'case' and 'loop' are statements in a process; outside, write 'a <= b when condition else c;'",
+        ),
+        (r"positional argument after named", "connect all by name: 'port => signal'"),
+        (r"can't associate string literal with generic", "write a number, true or false without quotation marks"),
         (r"object class keyword such as", "is the 'begin' of the architecture missing above?"),
         (
             r"signal declaration not allowed in process",
@@ -91,7 +100,7 @@ _HINTS = tuple(
             r"[\"']<=[\"'] or [\"']:=[\"'] expected",
             "assign a signal with '<=', a variable with ':='; 'else if' is 'elsif'",
         ),
-        (r"port .* can't be assigned", "an input can only be read"),
+        (r"port .* can't be assigned", "an input can only be read: assign an output or a signal"),
     )
 )
 
@@ -127,6 +136,11 @@ def _declared(lines: Sequence[str]) -> Iterator[str]:
 def is_syntax(text: str) -> bool:
     """Return whether a message is about the syntax; the first one of a line causes the others."""
     return bool(_SYNTAX.match(text))
+
+
+def is_generate(text: str) -> bool:
+    """Return whether GHDL takes a statement outside a process for a 'generate'; further faults follow."""
+    return bool(_GENERATE.match(text))
 
 
 def is_unanalysed(text: str) -> bool:

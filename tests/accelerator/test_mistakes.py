@@ -132,7 +132,7 @@ VHDL = [
     ),
     # two sources of a signal
     ("  out_data <= (others => '0');\n", "", "out_data   ", "output 'out_data' has no source"),
-    ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data   ", "'out_data' has more than one source"),
+    ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data <= (others", "'out_data' has more than one source"),
     ("begin\n\n", "begin\n  is_there <= clk when rst_n = '0' else 'Z';\n", "", ""),
 ]
 _INSTANCE = "copy u (.i(in_step), .o(out_data));"
@@ -164,8 +164,8 @@ VERILOG = [
     # sources of signals
     (f"  {_ZERO}", "", "out_data", "output 'out_data' has no source"),
     ("out_data = 32'b0;", "out_data[7:0] = 8'b0;", "out_data", "a part of output 'out_data' has no source"),
-    (_ZERO, f"{_ZERO} assign out_data[7] = 1'b1;", "out_data,", "'out_data' has more than one source"),
-    (_ZERO, f"{_INSTANCE} copy v (.i(in_width), .o(out_data[31:0]));", "out_data,", "has more than one source"),
+    (_ZERO, f"{_ZERO}\n  assign out_data[7] = 1'b1;", "data[7] =", "'out_data' has more than one source"),
+    (_ZERO, f"{_INSTANCE}\n  copy v (.i(in_width), .o(out_data[31:0]));", "copy v", "has more than one source"),
     (_ZERO, f"{_ZERO} assign in_step = 32'b1;", "in_step", "'in_step' is an input, and is assigned"),
     (_ZERO, "always @* out_data = 32'b0;", "always", "'out_data' is a wire, and is assigned in a block"),
     (_ZERO, "reg [31:0] r; assign r = 0; assign out_data = r;", "reg", "'r' is a reg, and is assigned in a continuous"),
@@ -263,6 +263,14 @@ _PROCESS = "process (clk)\n  begin\n    if rising_edge(clk) then\n      out_data
         (_OUT, f"{_OUT} u : entity work.gain port map (clk => clk);", "add the file with 'gain' to 'sources'"),
         ("architecture rtl of img", "architecture rtl of image", "the entity in this file is 'img'"),
         (_OUT, "out_data <= in_step(15 downto 0);", "compare the ranges"),
+        (
+            _OUT,
+            f"if in_msg_valid = '1' then\n    {_OUT}\n  else\n    {_OUT}\n  end if;",
+            "'if', 'case' and 'loop' are statements in a process",
+        ),
+        (_READY, "", "assign it a value: no message passes without it"),
+        (_OUT, "u : entity work.img port map (clk => clk, '1');", "connect all by name: 'port => signal'"),
+        ("begin\n\n", "begin\n  out_data <= in_step;\n", "and remove the others; see also line "),
     ],
 )
 def test_a_mistake_in_vhdl_is_one_fault_with_a_cure(old: str, new: str, hint: str) -> None:
@@ -300,6 +308,7 @@ _BLOCK = "reg [31:0] r; always @(posedge clk) "
         ),
         (_ZERO, f"logic [31:0] r; {_ZERO}", "logic", "'logic' is SystemVerilog, whose files end in .sv: rename img.v"),
         (_ZERO, "always_comb out_data = 32'b0;", "always_comb", "'always_comb' is SystemVerilog"),
+        (_ZERO, "assign out_data <= 32'b0;", "assign", "write '=': an 'assign' has no '<='"),
         (_ZERO, "out_data = 32'b0;", "out_data", "write 'assign' before it, or put it into an 'always' block"),
         (_ZERO, f"{_BLOCK} if (in_step = 1) r <= 1;", "always", ""),
     ],
@@ -312,6 +321,19 @@ def test_a_fault_in_the_syntax_of_verilog_has_a_cure(old: str, new: str, where: 
     assert bool(hint) == bool(fault.hint)
     assert fault.source
     assert where in fault.source.text
+
+
+@pytest.mark.parametrize(
+    ("new", "hint", "is_warning"),
+    [
+        ("assign out_data = in_stepp;", "did you mean 'in_step'?", False),
+        ("assign out_data = qwqwqw;", "declare it: an undeclared name is a wire of 1 bit", False),
+        (f"copy u (.i(in_step), .o(between)); copy v (.i(between), .o()); {_ZERO}", "declare it", True),
+    ],
+)
+def test_an_undeclared_name_that_does_not_connect_instances_is_a_fault(new: str, hint: str, is_warning: bool) -> None:
+    (found,) = diagnostics("verilog", _ZERO, new)
+    assert (found.is_warning, found.hint[: len(hint)]) == (is_warning, hint)
 
 
 @pytest.mark.parametrize("new", LEGAL_VERILOG)
@@ -396,6 +418,16 @@ _PORTS = (
             "'firm_float_multiply'?",
         ),
         ("firm_axis_fifo u ();", "no module 'firm_axis_fifo' in the sources", "it is in robot:axis:firm_axis"),
+        (
+            f"firm_float_multiply {_PARAMETERS.replace('8', 'TEXT')} u ({_PORTS});".replace("TEXT", '"8"'),
+            "parameter 'EXPONENT_BITS' of 'firm_float_multiply' is a positive, not a text",
+            "write the number without quotation marks",
+        ),
+        (
+            f'firm_fixed_to_float {_PARAMETERS[:-1]}, .IS_SIGNED("false")) u (.clk(clk));',
+            "parameter 'IS_SIGNED' of 'firm_fixed_to_float' is a boolean, not a text",
+            "write 1 for true, and 0 for false, without quotation marks",
+        ),
     ],
 )
 def test_entities_of_other_cores_in_verilog(instance: str, message: str, hint: str) -> None:
@@ -408,6 +440,23 @@ def test_entities_of_other_cores_in_verilog(instance: str, message: str, hint: s
     assert told.source
     assert hint in told.hint
     assert instance.split(maxsplit=1)[0] in told.source.text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        (".MANTISSA_BITS(23)", ".MANTISA_BITS(23)", ".MANTISA_BITS"),
+        (".in_b(in_width)", ".in_c(in_width)", ".in_c("),
+        (".in_b(in_width)", ".in_b(in_width[7:0])", ".in_b("),
+    ],
+)
+def test_a_fault_in_an_instance_has_the_place_of_the_name(old: str, new: str, line: str) -> None:
+    """Yosys knows only the place of the instance."""
+    others = Libraries([(path, "firm") for path in core_files("acc/float/float")], is_complete=True)
+    instance = f"firm_float_multiply {_PARAMETERS} u ({_PORTS});".replace(", ", ",\n    ").replace(old, new)
+    (fault,) = diagnostics("verilog", _ZERO, instance, others)
+    assert fault.source
+    assert fault.source.text[fault.source.column - 2 :].startswith(line)
 
 
 def test_a_float_of_the_wrong_size_in_vhdl() -> None:
