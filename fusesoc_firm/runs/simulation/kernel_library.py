@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import NoReturn
 
 from fusesoc_firm.core.request import GeneratedFile
 from fusesoc_firm.system.derived.cpp_function import kernel_entity, library_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.hardware.hls import kernel, shim
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
+from fusesoc_firm.text.outputs import shown
 from fusesoc_firm.text.render import Rendering, render
+from fusesoc_firm.tools.programs import find
 
 _COMPILER = "g++"
 # HLS tools provide their own header of this name.
@@ -34,9 +38,22 @@ _FLAGS = (
     "-MMD",
     "-Wno-unknown-pragmas",
 )
+# Messages are in English, with plain quotation marks.
+_ENVIRONMENT = {**os.environ, "LC_ALL": "C"}
 # A file name in a rule of make, with its escapes.
 _WORD = re.compile(r"(?:\\ |\S)+")
 _ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
+_ERROR = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+):(?P<column>\d+): (?:fatal )?error: (?P<text>.+)", re.MULTILINE)
+# Beginnings of the compiler's errors, each with its cure.
+_CURES = (
+    (r"cannot convert .* in assignment", "an output is a pointer: write '*name = value;'"),
+    (r"invalid conversion from .* to .*\*", "an output is a pointer: write '*name = value;'"),
+    (r"expected '[;}]'|expected .* before", "is a ';', a ')' or a '}' missing before this place?"),
+    (
+        r".* was not declared in this scope|.* is not a member of 'std'",
+        "declare it, correct its name, or include its header, such as <cmath>",
+    ),
+)
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
@@ -61,6 +78,12 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
     }
 
 
+def check_compiles(accelerator: AcceleratorType, folder: Path) -> None:
+    """Raise `InputError` if the C++ does not compile; without a compiler, nothing is known."""
+    if find(_COMPILER):
+        _compile(accelerator, folder, _text(shim(accelerator)))
+
+
 def _text(rendering: Rendering) -> str:
     return render(rendering.template, rendering.context)
 
@@ -79,17 +102,30 @@ def _compile(accelerator: AcceleratorType, folder: Path, program: str) -> bytes:
         options = ["-I", str(above), "-I", ".", f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
         command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
         try:
-            result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+            result = subprocess.run(command, cwd=place, capture_output=True, text=True, env=_ENVIRONMENT, check=False)
         except FileNotFoundError:
             fail(f"'{_COMPILER}' is required to simulate '{name}', but is not installed")
         if result.returncode:
-            fail(
-                f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
-                first.source,
-                f"expected: {prototype(accelerator)}",
-            )
+            _report(accelerator, folder, result.stderr)
         _check_included(accelerator, folder, place)
         return (place / "kernel.so").read_bytes()
+
+
+def _report(accelerator: AcceleratorType, folder: Path, output: str) -> NoReturn:
+    """Raise `InputError` with the compiler's errors, of which the first one of a line causes the others."""
+    first = accelerator.accelerator.sources[0]
+    faults, lines = Diagnostics(), set()
+    for found in _ERROR.finditer(output):
+        path = folder / found["file"]
+        if path.is_file() and (path, found["line"]) not in lines:
+            lines.add((path, found["line"]))
+            text = path.read_text(encoding="utf-8", errors="replace").splitlines()[int(found["line"]) - 1]
+            source = SourceRef(shown(path), int(found["line"]), int(found["column"]), text)
+            cure = next((known for pattern, known in _CURES if re.match(pattern, found["text"])), "")
+            faults.error(found["text"], source, cure)
+    faults.raise_if_any()
+    message = f"the C++ of '{accelerator.accelerator.name}' does not compile:\n{output.rstrip()}"
+    fail(message, first.source, f"expected: {prototype(accelerator)}")
 
 
 def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:

@@ -14,7 +14,7 @@ from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.runs.simulation.environment import environment_files
 from fusesoc_firm.runs.simulation.host_files import expected_text, stimulus_text
-from fusesoc_firm.runs.simulation.kernel_library import kernel_files
+from fusesoc_firm.runs.simulation.kernel_library import check_compiles, kernel_files
 from fusesoc_firm.runs.simulation.model_text import check_model
 from fusesoc_firm.runs.simulation.reference import Response, load_model
 from fusesoc_firm.runs.simulation.software_run import (
@@ -108,6 +108,9 @@ def check(request: Request, loaded: LoadedSystem, *, may_run: bool) -> None:
     with faults.noting():
         _check_possible(request, loaded)
         environment_files(_environment(request), loaded.system)
+    for kernel in loaded.system.kernels:
+        with faults.noting():
+            check_compiles(kernel, loaded.folder)
     with faults.noting(request.place("stimuli")):
         stimuli = system_stimuli(_path(request, "stimuli"), loaded, _MOST_CHECKED + 1)
     path = _path(request, "model")
