@@ -129,12 +129,13 @@ def check_all(
     `simulation` is the core's target of the simulation, or None to check no core. Nothing is built, and the user's
     Python code is only read unless it `may_run`. Raise `InputError` with the faults of all parts.
     """
-    from fusesoc_firm.builds.check import check_core
+    from fusesoc_firm.builds.check import check_core, check_toplevels
     from fusesoc_firm.builds.setup.core_schema import check_loadable
     from fusesoc_firm.fabric.ethernet import ethernet_node
     from fusesoc_firm.fabric.ros1 import memory_of
     from fusesoc_firm.runs.simulation.software_run import system_stimuli
     from fusesoc_firm.system.message_sources import check_specs_of, core_of
+    from fusesoc_firm.system.scaffold.core_file import toplevels
 
     core = core_of(spec) if simulation else None
     if core:
@@ -152,7 +153,8 @@ def check_all(
     # What the user's model prints is not part of the answer.
     with faults.noting(), redirect_stdout(sys.stderr):
         if core and simulation:
-            check_core(core, simulation, may_run=may_run)
+            check_toplevels(core, toplevels(loaded.system), faults)
+            warnings += check_core(core, simulation, may_run=may_run)
         elif simulation:
             check_specs_of(spec.parent)
     faults.raise_if_any()

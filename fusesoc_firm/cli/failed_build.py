@@ -18,7 +18,7 @@ _MOST_LINES = 30
 _ERROR = re.compile(r"(?:\b|:)error\b|\(assertion failure\)|^Traceback|^\S+:\d+:\d+: ", re.IGNORECASE)
 # Lines of FuseSoC, Edalize and make around the message of the tool that failed.
 _NOISE = re.compile(
-    r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|Setup failed|.* exited with an error)|far: "
+    r"(INFO|WARNING): |make(\[\d+\])?: |ERROR: (Failed to (build|run)|.* exited with an error)|far: "
     r"|Info: |(Entering|Leaving) directory |\S+ -m fusesoc_firm\.cli tool "
 )
 # A place in a file that FuseSoC copied into the build folder.

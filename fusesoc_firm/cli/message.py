@@ -9,7 +9,7 @@ from typing import Any
 
 from fusesoc_firm.cli.common import add_definitions, command, library_of, positive
 from fusesoc_firm.converter.stages import STAGES, stages_text
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import closest, fail, nearest
 
 
 def add_message(commands: Any) -> None:
@@ -85,7 +85,12 @@ def _list_messages(arguments: argparse.Namespace) -> None:
     library = library_of(arguments, arguments.ros)
     origins = {str(name): library.origin(name) for name in library.names()}
     origins |= {str(interface): str(file) for interface, file in library.interfaces().items()}
-    names = sorted(name for name in origins if fnmatch.fnmatchcase(name, arguments.pattern))
+    pattern = arguments.pattern
+    names = sorted(name for name in origins if fnmatch.fnmatchcase(name, pattern))
+    if not names:
+        packages = {f"{name.partition('/')[0]}/*" for name in origins}
+        near = closest(pattern, {*origins, *packages})
+        fail(f"no message matches '{pattern}'", hint=nearest(pattern, [near] if near else packages))
     width = max((len(name) for name in names), default=0)
     for name in names:
         print(f"{name:{width}}  {origins[name]}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command
-from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.diagnostics import SourceRef, fail, nearest_file
 from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _tell_lines(written: str) -> None:
 
     path, number = _split(written)
     if not path.is_file():
-        fail(f"there is no file {path}", hint="the form is FILE or FILE:LINE")
+        fail(f"there is no file {path}", hint=nearest_file(path) or "the form is FILE or FILE:LINE")
     found = why(path)
     if number is None:
         for count, reason in enumerate(found, start=1):

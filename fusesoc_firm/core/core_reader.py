@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -59,20 +59,25 @@ class CoreFile:
         return self.text.source(node)
 
     def place_of(self, word: str) -> SourceRef:
-        """Return the place of the first text that contains a word, or of the beginning."""
+        """Return the place of the first text that is a word, or else contains it, or of the beginning."""
+        texts = [*self._texts()]
+        found = [node for node in texts if node.value == word] or [node for node in texts if word in node.value]
+        return self.source(found[0]) if found else SourceRef(str(self.path), 1, 1)
+
+    def _texts(self) -> Iterator[yaml.ScalarNode]:
+        """Yield all texts of the file, in their order."""
         waiting: list[yaml.Node] = [self.text.root] if self.text.root else []
         seen: set[int] = set()
         while waiting:
             node = waiting.pop(0)
-            if isinstance(node, yaml.ScalarNode) and word in node.value:
-                return self.source(node)
+            if isinstance(node, yaml.ScalarNode):
+                yield node
             # An alias may refer to a node that contains it.
             if id(node) not in seen and isinstance(node, yaml.CollectionNode):
                 seen.add(id(node))
                 items = node.value
                 inner = [part for pair in items for part in pair] if isinstance(node, yaml.MappingNode) else items
                 waiting[:0] = inner
-        return SourceRef(str(self.path), 1, 1)
 
 
 def pair_of(node: yaml.Node | None, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:

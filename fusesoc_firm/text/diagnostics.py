@@ -182,10 +182,17 @@ def _is_twin(word: str, other: str) -> bool:
 
 
 def nearest_file(path: Path) -> str:
-    """Return a hint for a missing file: its missing folder, or the nearest file or all files of its kind there."""
+    """Return a hint for a missing file: its missing folder, a file of its name one folder below, or the nearest one.
+
+    Without a near file, it names all files of its kind.
+    """
     if not path.parent.is_dir():
         return f"there is no folder {path.parent}"
-    return nearest(path.name, [item.name for item in path.parent.glob(f"*{path.suffix}") if item.is_file()])
+    if below := sorted(path.parent.glob(f"*/{path.name}")):
+        return f"did you mean '{below[0]}'?"
+    names = [item.name for item in path.parent.iterdir() if item.is_file()]
+    near = closest(path.name, names)
+    return nearest(path.name, [near] if near else [name for name in names if name.endswith(path.suffix)])
 
 
 def closest(word: str, choices: Iterable[str]) -> str | None:

@@ -9,7 +9,8 @@ consequences.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -22,6 +23,7 @@ from fusesoc_firm.text.yaml_text import Text, YamlText, integer, is_null, items,
 
 # The fault in a text and the legal form, or None if there is no fault.
 TextRule = Callable[[str], tuple[str, str] | None]
+_WITHOUT_BLANK = re.compile(r"(\w+):(\S+)")
 S = TypeVar("S", bound="Section")
 
 
@@ -99,7 +101,7 @@ def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics,
 
     `what` names the section in messages, such as "a block".
     """
-    return _Reader(file, faults).section(section, node, what)
+    return _Reader(file, faults, section).section(section, node, what)
 
 
 @dataclass(frozen=True)
@@ -108,13 +110,15 @@ class _Reader:
 
     file: YamlText
     faults: Diagnostics
+    root: type[Section]
 
     def section(self, section: type[S], node: yaml.Node, what: str) -> S:
         """Return a section with all readable keys; required keys that are missing or unreadable have empty values."""
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, _words_of_keys(section))
+            hint = _spaced(node) or _words_of_keys(section)
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, hint)
             return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
@@ -137,7 +141,8 @@ class _Reader:
             if name is None:
                 near = closest(text, spellings)
                 meant |= {spellings[near]} if near else set()
-                self._error(f"{what} has no key '{text}'", key_node, nearest(text, [near] if near else known))
+                hint = _elsewhere(text, self.root) or nearest(text, [near] if near else known)
+                self._error(f"{what} has no key '{text}'", key_node, hint)
             elif name in given:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
             elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
@@ -242,11 +247,31 @@ def _empty(section: type[S], source: SourceRef) -> S:
     return section(source=source, is_sound=False, **_blanks(section, source))
 
 
+def _spaced(node: yaml.Node) -> str:
+    """Return a hint about a text that is a key and a value without a blank between them, or an empty text."""
+    found = _WITHOUT_BLANK.fullmatch(node.value) if isinstance(node, yaml.ScalarNode) else None
+    return f"write a blank after the colon: '{found[1]}: {found[2]}'" if found else ""
+
+
 def _words_of_keys(section: type[Section]) -> str:
     """Return a phrase with the keys that a section requires or, if it requires no keys, the keys that it may have."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
     return f"required keys: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
+
+
+def _elsewhere(name: str, root: type[Section]) -> str:
+    """Return a hint with the sections of a file that have a key of this name, or an empty text."""
+    found = [what for what, section in _sections(root, "the top level") if name in keys_of(section)]
+    return f"it is a key of {' and of '.join(found)}" if found else ""
+
+
+def _sections(section: type[Section], what: str) -> Iterator[tuple[str, type[Section]]]:
+    """Yield a section and all sections within it, each with its name in messages."""
+    yield what, section
+    for name, (_, entry) in keys_of(section).items():
+        if entry.section:
+            yield from _sections(entry.section, f"{'an item of ' * (entry.form == 'sections')}'{name}'")
 
 
 def _section_type(entry: Key) -> type[Section]:

@@ -218,6 +218,7 @@ _WITHOUT_BLANK = re.compile(r"[\s-]*\w+:[^\s/]")
 # What PyYAML was reading at a fault, and the probable cure.
 _CURES = {
     "while scanning a simple key": "write 'key: value', with a blank after the colon",
+    "while scanning an alias": "YAML does not calculate: write the values themselves, or a text in quotation marks",
     "while scanning a quoted scalar": "close the quotation mark",
     "while parsing a flow sequence": "close the list with ']', or separate its items with ','",
     "while parsing a flow mapping": "close the mapping with '}', or separate its items with ','",

@@ -80,6 +80,14 @@ def test_a_sound_project_is_valid(capsys: Captured) -> None:
             "      - robot:acc:firm_float\n    files: [pins.txt: {file_type: user}]\n",
             "tilt.core:11:13: error: there is no file pins.txt",
         ),
+        ("tilt.core", "toplevel: tilt_system_tb", "toplevel: tilt_sytem_tb", "tilt.core:27:15: error: no target has"),
+        ("tilt.core", "      - robot:firm:firm_system\n", "", "tilt.core:13:16: error: no core of this build has"),
+        ("tilt.yaml", "project:\n", "project:\n  paths: [msgs]\n", "tilt.yaml:3:3: error: 'project' has no key"),
+        ("tilt.yaml", "  name: tilt", "  name:tilt", "tilt.yaml:3:3: error: 'project' must be a mapping"),
+        ("tilt.yaml", "rtl/tilt.vhd", "rtl/", "tilt.yaml:7:14: error: 'sources' must be a file, not the folder"),
+        ("model.py", '[("pub", answer)]', "answer", "model.py:11:12: error: 'respond' returns {'x': message['x'],"),
+        ("model.py", 'message["x"]', "message.x", "model.py:7:14: error: a message has no attribute 'x'"),
+        ("model.py", "return ", "", "model.py:4:1: error: 'respond' returns nothing"),
     ],
     ids=lambda text: re.sub(r"\W+", " ", text)[:20],
 )
@@ -121,6 +129,9 @@ def test_a_check_reads_python_and_a_simulation_runs_it(capsys: Captured) -> None
         ("filesets:\n", "filset:\n", "did you mean 'filesets'?"),
         ("robot:acc:firm_float", "robot:acc:firm_flaot", "did you mean 'robot:acc:firm_float'?"),
         ("spec: tilt.yaml", "spec: tlit.yaml", "did you mean 'tilt.yaml'?"),
+        ("generate: [system, simulation],", "generate: [sytem, simulation],", "did you mean 'system'?"),
+        ("      - robot:firm:firm_system\n", "", "add 'robot:firm:firm_system' to 'depend' of a fileset"),
+        ("toplevel: tilt_system_tb", "toplevel: tilt_sytem_tb", "did you mean 'tilt_system_tb'?"),
     ],
 )
 def test_a_fault_in_the_core_ends_every_command_with_its_cure(old: str, new: str, hint: str, capsys: Captured) -> None:
@@ -128,6 +139,47 @@ def test_a_fault_in_the_core_ends_every_command_with_its_cure(old: str, new: str
     edit("tilt.core", old, new)
     for words in (["check"], ["sim"], ["bitstream", "--board", "icebreaker"]):
         assert hint in faults(capsys, *words)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "hint"),
+    [
+        ("tilt.yaml", "project:\n", "project:\n  paths: [msgs]\n", "it is a key of the top level"),
+        ("tilt.yaml", "project:\n", "project:\n  sources: x\n", "it is a key of an item of 'accelerators'"),
+        ("tilt.yaml", "  name: tilt", "  name:tilt", "write a blank after the colon: 'name: tilt'"),
+        ("tilt.yaml", "rtl/tilt.vhd", "rtl", "it is a folder; its files: tilt.vhd"),
+        ("stimuli.yaml", "{x: 0.5, y: 1.0, z: 1.5}", "[0.5, 1.0, 1.5]", "write {x: 0.5, y: 1.0, z: 1.5}"),
+        ("stimuli.yaml", "x: 0.5", "x: 0,5", "a decimal number has a point: 0.5"),
+        ("stimuli.yaml", "x: 0.5", "x: [0.5] * 3", "YAML does not calculate: write the values themselves"),
+        ("stimuli.yaml", "x: 0.5", "x: 1/2", "legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan; YAML does not"),
+        ("model.py", 'message["x"]', "message.x", 'a message is a dict: write message["x"]'),
+    ],
+)
+def test_a_mistake_has_its_cure(file: str, old: str, new: str, hint: str, capsys: Captured) -> None:
+    edit(file, old, new)
+    assert f"      = {hint}" in faults(capsys, "check")
+
+
+def test_a_fileset_without_a_target_is_a_warning(capsys: Captured) -> None:
+    edit("tilt.core", "generate:\n", "  mine:\n    files: [rtl/tilt.vhd]\n\ngenerate:\n")
+    assert main(["check"]) == 0
+    assert capsys.readouterr().err.startswith("tilt.core:12:3: warning: no target uses the fileset 'mine'\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["check", "tilt.yml"], "did you mean 'tilt.yaml'?"),
+        (["check", "tlit.yaml"], "did you mean 'tilt.yaml'?"),
+        (["why", "tilt.vhd:3"], "did you mean 'rtl/tilt.vhd'?"),
+        (["graph", "robot:sys:tlit"], "did you mean 'robot:sys:tilt'? 'fusesoc core list' lists all cores"),
+        (["graph", "abcde"], "cores here: robot:sys:tilt; 'fusesoc core list' lists all cores"),
+        (["message", "list", "geomtry_msgs"], "did you mean 'geometry_msgs/*'?"),
+        (["message", "list", "geometry_msgs/Pont"], "did you mean 'geometry_msgs/Point'?"),
+    ],
+)
+def test_a_misspelt_argument_has_its_nearest(words: list[str], hint: str, capsys: Captured) -> None:
+    assert f"      = {hint}\n" in faults(capsys, *words)
 
 
 def test_stimuli_that_are_missing_are_not_taken_for_the_specification(capsys: Captured) -> None:

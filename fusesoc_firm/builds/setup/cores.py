@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.builds.setup.folder_lock import FolderLock
-from fusesoc_firm.builds.setup.libraries import core_fault, ignored, open_libraries, unsolved
+from fusesoc_firm.builds.setup.libraries import core_fault, core_hint, open_libraries, unsolved
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.scripts import script_files
 from fusesoc_firm.core.core_reader import CoreFile, read_core
@@ -238,7 +238,7 @@ def _found(core: str, options: RunOptions = _NO_OPTIONS) -> tuple[Any, Any]:
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
-        fail(f"unknown core '{core}'", hint=ignored(fusesoc, core) or "'fusesoc core list' lists all cores")
+        fail(f"unknown core '{core}'", hint=core_hint(fusesoc, core))
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:

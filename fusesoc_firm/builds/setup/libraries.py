@@ -27,6 +27,9 @@ _LIBRARY = re.compile(r"\[library\.(.+)\]")
 _ITEM = re.compile(r"\s*([\w-]+)\s*[=:]\s*(.*\S)")
 _OWN_PLACE = "write the path that 'firm path' prints"
 _QUOTED = re.compile(r"'([^']+)'")
+ALL_CORES = "'fusesoc core list' lists all cores"
+# The sections of a core whose items a target names.
+_SECTIONS = ("filesets", "generate", "parameters", "hooks", "scripts", "vpi")
 
 
 def open_libraries(config: Any = None) -> Any:
@@ -119,6 +122,21 @@ def newest(depend: str, providers: Iterable[str]) -> str | None:
 
     fitting = [name for name in map(Vlnv, providers) if fits(name)]
     return str(max(fitting, key=version)) if fitting else None
+
+
+def cores_here(fusesoc: Any) -> list[str]:
+    """Return the names of the cores whose files are below the current folder, sorted."""
+    here, cores = Path.cwd().resolve(), fusesoc.get_cores()
+    return sorted(name for name in cores if Path(cores[name].core_file).resolve().is_relative_to(here))
+
+
+def core_hint(fusesoc: Any, core: str) -> str:
+    """Return a hint for an unknown core: why its file is ignored, the nearest name, or the cores of this folder."""
+    short = {name.split(":")[2]: core_name(name) for name in fusesoc.get_cores()}
+    near = closest(core.split(":")[2] if core.count(":") > 1 else core, short)
+    here = ", ".join(map(core_name, cores_here(fusesoc)))
+    meant = f"did you mean '{short[near]}'? " if near else f"cores here: {here}; " if here else ""
+    return ignored(fusesoc, core) or meant + ALL_CORES
 
 
 def ignored(fusesoc: Any, core: str) -> str:
@@ -225,7 +243,18 @@ def core_fault(core: Any, error: SyntaxError) -> Diagnostic:
     """Return FuseSoC's fault about the content of a core as a fault at the place of the first name in its message."""
     message = str(error.msg).removeprefix(f"{core.name} : ")
     named = _QUOTED.search(message)
-    return Diagnostic(message, core_place(core, named[1] if named else ""))
+    word = named[1] if named else ""
+    return Diagnostic(message, core_place(core, word), _nearest_item(core, word))
+
+
+def _nearest_item(core: Any, word: str) -> str:
+    """Return a hint for an unknown name in the file of a core: the nearest of the names that the file defines."""
+    try:
+        file = read_core(Path(core.core_file))
+    except InputError:
+        return ""
+    near = closest(word, [name for section in _SECTIONS for name in file.section(section)])
+    return f"did you mean '{near}'?" if near and near != word else ""
 
 
 def core_place(core: Any, word: str) -> SourceRef | None:

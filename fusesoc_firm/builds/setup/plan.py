@@ -10,7 +10,7 @@ from typing import Any
 
 from fusesoc_firm.builds.setup.cores import calls_of, fetch, solved
 from fusesoc_firm.builds.setup.flows import flow_of
-from fusesoc_firm.builds.setup.libraries import check_files, ignored, open_libraries
+from fusesoc_firm.builds.setup.libraries import ALL_CORES, check_files, core_hint, cores_here, open_libraries
 from fusesoc_firm.builds.setup.outcome import Build, configuration
 from fusesoc_firm.builds.setup.run_options import RunOptions
 from fusesoc_firm.builds.setup.selection import Selection, is_pattern, matching
@@ -111,7 +111,7 @@ def plan_tests(selection: Selection, options: RunOptions, build_root: Path | Non
     for core, patterns in selection.parts() or [("", selection.targets)]:
         # Cores that are not named one by one need not have these tests.
         is_lenient = selection.is_where_present or not core or is_pattern(core)
-        for name in _names(fusesoc, core, (), faults) if core else _cores_here(fusesoc):
+        for name in _names(fusesoc, core, (), faults) if core else cores_here(fusesoc):
             if selection.affected is not None and name not in selection.affected:
                 continue
             tests = _tests(fusesoc, name, options.use_flags(), patterns)
@@ -155,7 +155,7 @@ def _names(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics)
     if not is_pattern(core):
         return [name for name in [_full_name(fusesoc, core, targets, faults)] if name]
     if not (found := matching(sorted(fusesoc.get_cores()), core)):
-        faults.error(f"no core matches '{core}'", hint="'fusesoc core list' lists all cores")
+        faults.error(f"no core matches '{core}'", hint=ALL_CORES)
     has_version = core.count(":") == _COLONS_WITH_VERSION
     families = dict.fromkeys(name if has_version else name.rpartition(":")[0] for name in found)
     return [str(fusesoc.get_core(family).name) for family in families]
@@ -181,12 +181,6 @@ def _targets(
 
 def _work_root(fusesoc: Any, name: str, flags: Mapping[str, Any]) -> Path:
     return Path(fusesoc.get_work_root(fusesoc.get_core(name), flags))
-
-
-def _cores_here(fusesoc: Any) -> list[str]:
-    """Return the names of the cores whose files are below the current folder, sorted."""
-    here, cores = Path.cwd().resolve(), fusesoc.get_cores()
-    return sorted(name for name in cores if Path(cores[name].core_file).resolve().is_relative_to(here))
 
 
 def _tests(fusesoc: Any, name: str, further: Mapping[str, Any], selected: Collection[str]) -> dict[str, dict[str, Any]]:
@@ -222,13 +216,10 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
             faults.error(f"unknown version of core '{core}'", hint=f"known versions: {', '.join(versions)}")
             return None
         all_fitting = [name for name, item in cores.items() if {*targets} <= item.get_data({}).targets.keys()]
-        fitting = [name for name in all_fitting if name in _cores_here(fusesoc)] or all_fitting
+        fitting = [name for name in all_fitting if name in cores_here(fusesoc)] or all_fitting
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if targets and fitting else ""
-        short = {item.split(":")[2]: item.rpartition(":")[0] for item in cores}
-        near = closest(core.split(":")[2] if core.count(":") > 1 else core, short)
-        meant = f"did you mean '{short[near]}'? " if near else ""
-        hint = ignored(fusesoc, core) or meant + (listed or "'fusesoc core list' lists all cores")
-        faults.error(f"unknown core '{core}'", hint=hint)
+        hint = core_hint(fusesoc, core)
+        faults.error(f"unknown core '{core}'", hint=hint.replace(ALL_CORES, listed) if listed else hint)
         return None
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from fusesoc_firm.builds.setup.cores import GRAPH_TEMPLATE, ProjectCore, short
 from fusesoc_firm.builds.setup.flows import target_flow
-from fusesoc_firm.builds.setup.libraries import newest, open_libraries
+from fusesoc_firm.builds.setup.libraries import ALL_CORES, newest, open_libraries
 from fusesoc_firm.builds.setup.selection import matching
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.json_text import json_text
@@ -181,7 +181,7 @@ def kinds(patterns: Sequence[str]) -> Answer:
 def named(names: Iterable[str], pattern: str) -> list[str]:
     """Return the names that match a pattern. Raise `InputError` without a match."""
     if not (found := matching(names, pattern)):
-        fail(f"no core matches '{pattern}'", hint="'fusesoc core list' lists all cores")
+        fail(f"no core matches '{pattern}'", hint=ALL_CORES)
     return found
 
 

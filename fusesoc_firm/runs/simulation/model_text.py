@@ -16,7 +16,7 @@ from pathlib import Path
 from fusesoc_firm.accelerator.user_code import absent_module, fail_missing, nodes_of, place_in, place_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.runs.simulation.reference import ANSWER, NAME, PARAMETERS
-from fusesoc_firm.system.derived.python_function import definition, takes
+from fusesoc_firm.system.derived.python_function import body_faults, definition, takes
 from fusesoc_firm.text.diagnostics import Diagnostics, closest, nearest
 
 # With another Python, other packages are installed.
@@ -88,10 +88,9 @@ class _Answers:
         if not takes(self.function.args, len(PARAMETERS)):
             own = f"{NAME}({ast.unparse(self.function.args)})"
             self._note(f"'{NAME}' is called as '{_FORM}', but is defined as '{own}'", self.function)
-        values = [*self._values()]
-        if not values and not any(isinstance(node, ast.Raise) for node in nodes_of(self.function)):
-            self._note(f"'{NAME}' returns nothing", self.function, ANSWER)
-        for value in values:
+        for node, message, cure in body_faults(self.function, self.function.args.args[1:], has_result=True):
+            self._note(message, node, ANSWER if node is self.function else cure)
+        for value in self._values():
             self._check_value(value)
 
     def _values(self) -> Iterator[ast.expr]:
@@ -108,8 +107,9 @@ class _Answers:
             case ast.Tuple(elts=[ast.Constant(value=str()), _]):
                 self._note(f"'{NAME}' returns one response, not a list", value, f"write [{ast.unparse(value)}]")
                 return
-            case ast.Dict() | ast.Constant(value=int() | float() | None):
-                self._note(f"'{NAME}' returns {ast.unparse(value)}, which is not a list", value, ANSWER)
+        match self._literal(value):
+            case ast.Dict() | ast.Constant(value=int() | float() | None) as literal:
+                self._note(f"'{NAME}' returns {ast.unparse(literal)}, which is not a list", value, ANSWER)
         for item in _items(value):
             self._check_item(item)
 
@@ -137,20 +137,30 @@ class _Answers:
     def _fields(self, message: ast.expr) -> Collection[str] | None:
         """Return the fields of a message that is a literal, or the name of an unchanged literal; else None."""
         if isinstance(message, ast.Name):
-            uses = [node for node in ast.walk(self.function) if isinstance(node, ast.Name) and node.id == message.id]
-            literals = [
-                node.value
-                for node in nodes_of(self.function)
-                if isinstance(node, ast.Assign) and any(target in uses for target in node.targets)
-            ]
             # The name is bound once, and used once: nothing else changes the message.
-            if len(uses) != 2 or len(literals) != 1:
+            if len(self._uses(message.id)) != 2:
                 return None
-            message = literals[0]
+            message = self._literal(message)
         if not isinstance(message, ast.Dict):
             return None
         keys = [key.value for key in message.keys if isinstance(key, ast.Constant) and isinstance(key.value, str)]
         return keys if len(keys) == len(message.keys) else None
+
+    def _literal(self, value: ast.expr) -> ast.expr:
+        """Return the only value that is bound to a name, or else the expression itself."""
+        if not isinstance(value, ast.Name):
+            return value
+        uses = self._uses(value.id)
+        found = [
+            node.value
+            for node in nodes_of(self.function)
+            if isinstance(node, ast.Assign) and any(target in uses for target in node.targets)
+        ]
+        is_bound_once = sum(isinstance(node.ctx, ast.Store) for node in uses) == 1
+        return found[0] if len(found) == 1 and is_bound_once else value
+
+    def _uses(self, name: str) -> list[ast.Name]:
+        return [node for node in ast.walk(self.function) if isinstance(node, ast.Name) and node.id == name]
 
     def _note(self, message: str, node: ast.expr | ast.FunctionDef, hint: str = "") -> None:
         self.faults.error(message, place_of(self.path, node), hint)

@@ -88,8 +88,7 @@ class _Reader:
         """Return the message at `path`, which is empty for the whole message."""
         what = f"'{path}'" if path else f"a {self.name}"
         if not isinstance(node, yaml.MappingNode):
-            fields = ", ".join(branch.fields)
-            self._error(f"{what} must be a mapping of fields, not {kind(node)}", node, f"legal fields: {fields}")
+            self._error(f"{what} must be a mapping of fields, not {kind(node)}", node, _as_mapping(node, branch))
             return {}
         found: dict[str, Any] = {}
         for key, key_node, value in items(self.text, node, self.faults):
@@ -98,6 +97,8 @@ class _Reader:
             else:
                 near = _OF_OTHER_ROS.get(key, "")
                 hint = f"did you mean '{near}'?" if near in branch.fields else nearest(key, branch.fields)
+                if key.isdigit() and is_null(value):
+                    hint = "a decimal number has a point: 0.5"
                 self._error(f"{what} has no field '{key}'", key_node, hint)
         return found
 
@@ -148,6 +149,15 @@ class _Reader:
         self.faults.error(message, self.text.source(node), hint)
 
 
+def _as_mapping(node: yaml.Node, branch: _Branch) -> str:
+    """Return a hint with the mapping that a value means: its list with the names of the fields, or these names."""
+    values = node.value if isinstance(node, yaml.SequenceNode) else ()
+    if len(values) != len(branch.fields) or not all(isinstance(item, yaml.ScalarNode) for item in values):
+        return f"legal fields: {', '.join(branch.fields)}"
+    pairs = (f"{name}: {item.value}" for name, item in zip(branch.fields, values, strict=True))
+    return f"write {{{', '.join(pairs)}}}"
+
+
 def _value(text: str, type_: WireType) -> bool | int | float:
     """Return the value of a text. Raise `ValueError`, with the legal values, if the text is illegal."""
     if type_.code == "?":
@@ -184,7 +194,7 @@ def _float(text: str, type_: WireType) -> float:
         value = float(text)
         is_too_large = math.isinf(struct.unpack(f"<{type_.code}", struct.pack(f"<{type_.code}", value))[0])
     except ValueError:
-        raise ValueError("legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan") from None
+        raise ValueError("legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan; YAML does not calculate") from None
     except OverflowError:
         is_too_large = True
     if is_too_large:

@@ -180,7 +180,10 @@ class _Resolver:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())
         for source in accelerator.sources:
             if self.needs_sources and not is_file(self.folder / source):
+                folder = self.folder / source
                 hint = "paths are relative to the specification; 'firm system skeleton' writes a first version"
+                if folder.is_dir():
+                    hint = f"it is a folder; its files: {', '.join(sorted(item.name for item in folder.iterdir()))}"
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"

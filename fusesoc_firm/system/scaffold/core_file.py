@@ -157,9 +157,19 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
     return text[: section.start()] + "\n\n".join([targets.rstrip("\n"), *own]) + "\n" + (f"\n{rest}" if rest else "")
 
 
+def toplevels(system: DerivedSystem) -> dict[str, str]:
+    """Return the top level of each target that the core of a system may have."""
+    kinds = _kinds(system, is_simulated=True)
+    return {"default": system.entity} | {target.name: target.toplevel for kind in kinds for target in kind.targets}
+
+
+def _kinds(system: DerivedSystem, *, is_simulated: bool) -> list[_Kind]:
+    return [*(_simulations(system) if is_simulated else ()), *_reports(system), _boards(system)]
+
+
 def _targets(system: DerivedSystem, *, is_simulated: bool) -> str:
     has_kernels = bool(system.kernels)
-    kinds = [*(_simulations(system) if is_simulated else ()), *_reports(system), _boards(system)]
+    kinds = _kinds(system, is_simulated=is_simulated)
     return render(
         TARGETS_TEMPLATE,
         {

@@ -85,6 +85,8 @@ def source_fault(text: str) -> tuple[str, str] | None:
     """Return the reason why `text` is not a legal name of a source file, or None if the name is legal."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
+    if text.endswith("/"):
+        return f"must be a file, not the folder '{text}'", "list its files: [rtl/one.vhd, rtl/two.vhd]"
     legal = "legal here: names of up to 200 letters, digits, '_', '.', '+' and '-', not starting with '-'"
     return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not accept as a file", legal)
 
