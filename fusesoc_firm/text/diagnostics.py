@@ -195,10 +195,10 @@ def nearest_file(path: Path) -> str:
     return nearest(path.name, [near] if near else [name for name in names if name.endswith(path.suffix)])
 
 
-def closest(word: str, choices: Iterable[str]) -> str | None:
-    """Return the word that was probably meant, regardless of case, or None if none is similar."""
+def closest(word: str, choices: Iterable[str], similarity: float = 0.6) -> str | None:
+    """Return the word that was probably meant, regardless of case, or None if none has this similarity, of 0 to 1."""
     lowered = {choice.lower(): choice for choice in sorted(set(choices))}
     # Swapped letters are nearer than a missing letter: `clocsk` is `clocks`, not `clock`.
     close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]
-    close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=similarity)
     return lowered[close[0]] if close else None

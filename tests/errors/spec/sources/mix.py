@@ -14,3 +14,7 @@ def keyword_only(message, *, gain):
 if True:
     def twice(message, gain=2, *more):
         return message
+
+
+def silent(message):
+    {"x": message.x}
