@@ -33,6 +33,19 @@ IN_VIEW = """(() => {
   return node.left >= pane.left && node.right <= pane.right && node.top >= pane.top && node.bottom <= pane.bottom;
 })()"""
 
+# The class of the header's verdict, and the verdict.
+HEAD = (
+    "(({ className, textContent }) => `${className}: ${textContent.trim()}`)(document.querySelector('header output'))"
+)
+# The ids of the wires in the colour of faults.
+RED_WIRES = """(() => {
+  const probe = document.body.appendChild(Object.assign(document.createElement("i"), { className: "bad" }));
+  const { color } = getComputedStyle(probe);
+  probe.remove();
+  const wires = [...document.querySelectorAll(".svelte-flow__edge")];
+  const isRed = (wire) => getComputedStyle(wire.querySelector("path")).stroke === color;
+  return wires.filter(isRed).map((wire) => wire.dataset.id);
+})()"""
 # What is drawn in the colour of faults.
 RED = """(() => {
   const probe = document.body.appendChild(Object.assign(document.createElement("i"), { className: "bad" }));
@@ -143,6 +156,7 @@ def test_a_run_is_readable(tmp_path: Path, size: tuple[int, int]) -> None:
         await press(page, "run")
         await page.until(f"{ROWS}.length > 5")
         await page.until("document.querySelectorAll('.block .value.known').length >= 4")
+        await page.until("document.querySelectorAll('path.stuck, path.idle').length === 0")
         await measure(page)
         assert await page.evaluate(RED) == []
 
@@ -202,13 +216,16 @@ def test_a_block_and_its_line_lead_to_each_other(robot: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("period", "verdict"),
+    ("period", "verdict", "head"),
     [
-        ("20 ms", "all messages meet their deadlines; the messages need 0 % of the channel's time"),
-        ("50 ns", "overloaded: the messages need 180 % of the channel's time; late: b"),
+        ("20 ms", "all messages meet their deadlines; the messages need 0 % of the channel's time", "good: no faults"),
+        ("50 ns", (late := "overloaded: the messages need 180 % of the channel's time; late: b"), f"warn: {late}"),
     ],
 )
-def test_an_evaluation_adds_the_times_that_it_needs(robot: Path, tmp_path: Path, period: str, verdict: str) -> None:
+def test_an_evaluation_adds_the_times_that_it_needs(
+    robot: Path, tmp_path: Path, period: str, verdict: str, head: str
+) -> None:
+    """The header has the verdict, too: an overloaded system is not called faultless."""
     robot.write_text(TEXT.replace("width: 32", "width: 32, clock: 100 MHz"), encoding="utf-8")
 
     async def steps(page: Page) -> None:
@@ -221,6 +238,27 @@ def test_an_evaluation_adds_the_times_that_it_needs(robot: Path, tmp_path: Path,
         await page.until("document.querySelector('.view').innerText.includes('Schedulers for this system')")
         assert yaml.safe_load(robot.read_text(encoding="utf-8"))["blocks"][2]["period"] == period
         await page.until(f"document.querySelector('.verdict').textContent === {json.dumps(verdict)}")
+        await page.until(f"{HEAD} === {json.dumps(head)}")
+        await measure(page)
+        # The header needs no open view, and a system with faults is not called overloaded.
+        await page.until(f"({view('evaluate')}.click(), true)")
+        robot.write_text(robot.read_text(encoding="utf-8").replace("type: filter", "type: filtr"), encoding="utf-8")
+        await page.until(f"{HEAD}.startsWith('bad: ')")
+        robot.write_text(robot.read_text(encoding="utf-8").replace("type: filtr", "type: filter"), encoding="utf-8")
+        await page.until(f"{HEAD} === {json.dumps(head)}")
+
+    seen(robot, tmp_path, (1400, 900), steps)
+
+
+def test_the_wire_of_a_fault_has_its_colour(robot: Path, tmp_path: Path) -> None:
+    robot.write_text(TEXT, encoding="utf-8")
+
+    async def steps(page: Page) -> None:
+        await page.until(f"{HEAD} === 'good: no faults'")
+        assert await page.evaluate(RED_WIRES) == []
+        robot.write_text("Vector3".join(TEXT.rsplit("Point", 1)), encoding="utf-8")
+        await page.until(f"{HEAD} === 'bad: 1 fault'")
+        await page.until(f"JSON.stringify({RED_WIRES}) === JSON.stringify(['way:1:0'])")
 
     seen(robot, tmp_path, (1400, 900), steps)
 

@@ -250,6 +250,22 @@ def test_a_full_queue_is_seen_at_its_wire(tmp_path: Path) -> None:
     watching(tmp_path, steps, "--fault=hang", "--at=20")
 
 
+def test_idle_wires_differ_from_stuck_ones(tmp_path: Path) -> None:
+    """The model takes no frame after 20. The point waits in all cycles, and nothing leaves the hardware."""
+
+    async def steps(page: Page) -> None:
+        await press(page, "run")
+        await page.until("document.querySelectorAll('path.stuck.first').length === 1")
+        await page.until(f"{words_at('point', 'point_out')}.trim() === 'stuck\\nwaits 100 %\\nbegins here'")
+        idle = "[...document.querySelectorAll('.svelte-flow__edge:has(path.idle)')].map(wire => wire.dataset.id).sort()"
+        await page.until(f"JSON.stringify({idle}) === JSON.stringify(['out:1', 'out:3', 'out:5'])")
+        await press(page, "pause")
+        await page.until("document.querySelectorAll('path.stuck, path.idle').length === 0")
+
+    hardware = modelled("--fault=hang", "--at=20", waits=(0, 0, 0, 0, 0, 100, 0, 0, 0, 0, 0))
+    watching(tmp_path, steps, hardware=hardware)
+
+
 def words_at(source: str, sink: str) -> str:
     """The script that finds the words at a wire."""
     return f"""document.querySelector('[data-wire="{source}>{sink}"]')?.textContent"""

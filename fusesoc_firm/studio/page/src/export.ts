@@ -55,7 +55,7 @@ function wire(edge: Edge, source: BlockNode, target: BlockNode, colour: Colour, 
   const data = edge.data as WireData;
   const [path, x, y] = wayOf(edge.id, from, to, data.way!);
   const { words, waiting } = live.shown(data);
-  const stroke = colour(waiting ? "warn" : "faint");
+  const stroke = colour(data.isFaulty || waiting.startsWith("stuck") ? "bad" : waiting ? "warn" : "faint");
   const line = `<path d="${path}" fill="none" stroke="${stroke}" stroke-width="${edge.class === "stream" ? 3 : 1}"/>`;
   return line + linesAt([edge.label, words].filter(Boolean).join("\n"), x, y, colour);
 }

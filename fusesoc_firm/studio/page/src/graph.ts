@@ -14,8 +14,8 @@ export type BlockData = BlockWords & { errors: number; warnings: number };
 /** A stream or a connection of hardware: its wire, and on a stream the converter, with the name of its end if it has one. */
 export type End = { wire: string; block?: string; title?: string };
 
-/** What is drawn as one wire, which shows those of a `file`'s run. */
-export type WireData = { file: string; ends: End[]; way?: Way };
+/** What is drawn as one wire, which shows those of a `file`'s run, and whether a fault is at the connection. */
+export type WireData = { file: string; ends: End[]; isFaulty?: boolean; way?: Way };
 
 /**
  * What the way of a wire depends on beside its ends: the height at which it passes the blocks that are before it, if there
@@ -187,6 +187,7 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
         ariaLabel: `connection from ${block.name} to ${way.name}`,
         data: {
           path: ["blocks", index, "outgoing", number],
+          isFaulty: faultsAt(scene.faults, ["blocks", index, "outgoing", number]).some((fault) => fault.severity === "error"),
           file: scene.file,
           ends: endsOr(taken, block.name).flatMap((source) => sinks.map((name) => ({ wire: wireKey(source, name) }))),
         },

@@ -1,8 +1,8 @@
 // What the page knows of the current run: counts and rates of each block, and the latest messages.
 
 import { address, type Jobs } from "./api";
-import type { WireData } from "./graph";
-import { since, waitsOf, waitWords, type Wait, type Waits, type Way } from "./waits";
+import type { End, WireData } from "./graph";
+import { publishersOf, since, TO_HOST, waitsOf, waitWords, type Wait, type Waits, type Way } from "./waits";
 
 /**
  * A message: number, block, seconds, bytes, and of a response: cause, cycles, ns of the wall clock; then its fields as
@@ -64,12 +64,16 @@ interface Report {
 /** What a drawn wire shows of a run; `waiting` is the class of its style. */
 export interface Shown {
   words: string;
-  waiting: "" | "waits" | "waits first";
+  waiting: "" | "waits" | "waits first" | "stuck" | "stuck first";
   isCrowded: boolean;
   isFlowing: boolean;
+  /** Nothing passes and nothing waits. */
+  isIdle: boolean;
 }
 
-const NOTHING: Shown = { words: "", waiting: "", isCrowded: false, isFlowing: false };
+const NOTHING: Shown = { words: "", waiting: "", isCrowded: false, isFlowing: false, isIdle: false };
+// The part of the cycles in which a wire waits that is stuck: nothing passes, and something is offered in all of them.
+const STUCK = 0.95;
 
 // Each further row costs time in each picture; older ones are in the record.
 const MOST_ROWS = 100;
@@ -116,6 +120,7 @@ export class Live {
   past = $state.raw<Waits | null>(null);
   #present = $state.raw<Waits | null>(null);
   #waits = $derived(waitsOf(this.run?.wires ?? [], this.past ?? this.#present));
+  #publishers = $derived(publishersOf(this.run?.wires ?? []));
   #history: Figures[] = [];
 
   /** What is known of the waits on a wire. */
@@ -132,13 +137,26 @@ export class Live {
     });
     const waits = ends.flatMap(({ wire }) => this.waits(wire) ?? []).filter((wait) => waitWords(wait));
     const isFirst = waits.some((wait) => wait.isFirst);
-    const waiting = waitWords({ share: Math.max(0, ...waits.map((wait) => wait.share)), isFirst });
+    const share = Math.max(0, ...waits.map((wait) => wait.share));
+    const waiting = waitWords({ share, isFirst });
+    const isRunning = this.run.state === "running" && !this.run.isPaused && !this.past;
+    // The host goes on to take messages for a subscriber that is stuck, so only what leaves the hardware counts.
+    const isStuck = isRunning && share >= STUCK && this.#leaving(ends).every((name) => !this.flowing.has(name));
+    const passed = ends.some(({ block, wire }) => [block ?? "", ...wire.split(">")].some((name) => this.flowing.has(name)));
+    const isFlowing = passed && !isStuck;
     return {
-      words: [...words, waiting].filter(Boolean).join("\n"),
-      waiting: waiting && (isFirst ? "waits first" : "waits"),
+      words: [...words, isStuck && "stuck", waiting].filter(Boolean).join("\n"),
+      waiting: waiting && `${isStuck ? "stuck" : "waits"}${isFirst ? " first" : ""}` as const,
       isCrowded: ends.some(({ block }) => this.crowded.has(block ?? "")),
-      isFlowing: ends.some(({ block, wire }) => [block ?? "", ...wire.split(">")].some((name) => this.flowing.has(name))),
+      isFlowing,
+      isIdle: isRunning && !isFlowing && !waiting,
     };
+  }
+
+  /** The publishers to which messages lead from the sinks of wires. */
+  #leaving(ends: End[]): string[] {
+    const ways = ends.map(({ wire }) => wire.split(">"));
+    return ways.flatMap(([source, sink]) => [...(this.#publishers.get(sink === TO_HOST ? source : sink) ?? [])]);
   }
 
   /** What a block of a file does: whether messages pass it, or wait because its queue is full. */

@@ -48,6 +48,18 @@ export interface Schedulers {
   policies: Policy[];
 }
 
+/** The publishers of the chosen scheduler that miss their deadlines, and the verdict in words. */
+export function verdictOf({ policies, chosen, utilisation }: Schedulers): { late: string[]; words: string } {
+  const bounds = policies.find((policy) => policy.name === chosen)?.publishers ?? [];
+  const late = bounds.filter(isLate).map((bound) => bound.name);
+  const load = `the messages need ${Math.round(100 * utilisation)} % of the channel's time`;
+  if (!late.length) return { late, words: `all messages meet their deadlines; ${load}` };
+  return { late, words: `${utilisation > 1 ? "overloaded: " : ""}${load}; late: ${late.join(", ")}` };
+}
+
+/** Whether a publisher misses its deadline, or has no bound. */
+export const isLate = ({ latenessCycles: late }: { latenessCycles: number | null }) => late === null || late > 0;
+
 /** A burst: block, first and last cycle. */
 export type Grant = [string, number, number];
 

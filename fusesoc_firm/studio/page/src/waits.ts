@@ -40,6 +40,16 @@ export function waitsOf(wires: Way[], waits: Waits | null): Map<string, Wait> {
   return found;
 }
 
+/** The publishers to which messages lead from each block. */
+export function publishersOf(wires: Way[]): Map<string, Set<string>> {
+  const found = new Map(wires.flat().map((name) => [name, new Set<string>()]));
+  const inner = wires.filter(([source, sink]) => source !== FROM_HOST && sink !== TO_HOST);
+  for (const [source, sink] of wires) if (sink === TO_HOST) found.get(source)!.add(source);
+  // A path has at most as many wires as there are.
+  for (const _ of inner) for (const [source, sink] of inner) found.get(sink)!.forEach((name) => found.get(source)!.add(name));
+  return found;
+}
+
 /** The sum of counts in their order; null without any. */
 export function sumOf(parts: Waits[]): Waits | null {
   if (!parts.length) return null;
