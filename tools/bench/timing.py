@@ -85,6 +85,8 @@ _ARITHMETIC = (
     "firm_fixed_to_float",
     "firm_float_to_fixed",
 )
+# Those with the generic IS_SHORT.
+_SHORT = ("firm_float_add", "firm_float_multiply")
 
 
 @dataclass(frozen=True)
@@ -282,6 +284,8 @@ def _arithmetic() -> Iterator[Row]:
         for entity in _ARITHMETIC:
             generics = {"EXPONENT_BITS": exponent, "MANTISSA_BITS": mantissa}
             yield Row(entity, width, _operation(entity, generics))
+        for entity in _SHORT:
+            yield Row(f"{entity}, short", width, _operation(entity, {**generics, "IS_SHORT": True}))
     for width, other in (64, 32), (32, 64):
         generics = {
             f"{side}_{name}": bits

@@ -14,7 +14,9 @@ entity firm_float_multiply is
   generic (
     -- 11 and 52 for float64, 8 and 23 for float32.
     EXPONENT_BITS : positive := 11;
-    MANTISSA_BITS : positive := 52
+    MANTISSA_BITS : positive := 52;
+    -- Fewer cycles and registers, for lower clock frequencies.
+    IS_SHORT      : boolean  := false
   );
   port (
     clk        : in  std_logic;
@@ -42,6 +44,7 @@ architecture rtl of firm_float_multiply is
   signal exact     : std_logic;
   signal sign      : std_logic;
   signal kind      : kind_t;
+  -- Less one in the short form.
   signal exponent  : signed(RANGE_BITS-1 downto 0);
   signal magnitude : unsigned(WIDTH-1 downto 0);
 
@@ -55,7 +58,9 @@ begin
     generic map (
       EXPONENT_BITS => EXPONENT_BITS,
       MANTISSA_BITS => MANTISSA_BITS,
-      REST          => 1
+      REST          => 1,
+      LESS          => boolean'pos(IS_SHORT),
+      IS_SHORT      => IS_SHORT
     )
     port map (
       clk           => clk,
@@ -74,26 +79,51 @@ begin
     );
 
   -- One factor may be subnormal; the product of two such numbers is below the smallest number.
-  u_round : entity firm.firm_float_round
-    generic map (
-      EXPONENT_BITS => EXPONENT_BITS,
-      MANTISSA_BITS => MANTISSA_BITS,
-      RANGE_BITS    => RANGE_BITS,
-      WIDTH         => WIDTH,
-      MAX_LEFT      => MANTISSA_BITS+1,
-      HAS_UNDERFLOW => true
-    )
-    port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      advance      => advance,
-      in_valid     => exact,
-      in_sign      => sign,
-      in_kind      => kind,
-      in_exponent  => exponent,
-      in_magnitude => magnitude,
-      out_valid    => valid,
-      out_number   => out_number
-    );
+  in_many_stages : if not IS_SHORT generate
+    u_round : entity firm.firm_float_round
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS,
+        RANGE_BITS    => RANGE_BITS,
+        WIDTH         => WIDTH,
+        MAX_LEFT      => MANTISSA_BITS+1,
+        HAS_UNDERFLOW => true
+      )
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        advance      => advance,
+        in_valid     => exact,
+        in_sign      => sign,
+        in_kind      => kind,
+        in_exponent  => exponent,
+        in_magnitude => magnitude,
+        out_valid    => valid,
+        out_number   => out_number
+      );
+  end generate in_many_stages;
+
+  in_few_stages : if IS_SHORT generate
+    u_round : entity firm.firm_float_round_short
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS,
+        RANGE_BITS    => RANGE_BITS,
+        WIDTH         => WIDTH,
+        HAS_UNDERFLOW => true
+      )
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        advance      => advance,
+        in_valid     => exact,
+        in_sign      => sign,
+        in_kind      => kind,
+        in_limit     => exponent,
+        in_magnitude => magnitude,
+        out_valid    => valid,
+        out_number   => out_number
+      );
+  end generate in_few_stages;
 
 end architecture rtl;

@@ -17,7 +17,11 @@ entity firm_float_product is
     EXPONENT_BITS : positive;
     MANTISSA_BITS : positive;
     -- Bits of the rest.
-    REST          : positive
+    REST          : positive;
+    -- Subtracted from the exponent.
+    LESS          : natural := 0;
+    -- All rows are added at once.
+    IS_SHORT      : boolean := false
   );
   port (
     clk           : in  std_logic;
@@ -33,7 +37,7 @@ entity firm_float_product is
     out_valid     : out std_logic;
     out_sign      : out std_logic;
     out_kind      : out std_logic_vector(1 downto 0);
-    -- 1 if the product is zero.
+    -- 1 less LESS if the product is zero.
     out_exponent  : out signed(EXPONENT_BITS+1 downto 0);
     out_magnitude : out unsigned(2*MANTISSA_BITS+1 downto 0);
     out_rest      : out std_logic_vector(REST-1 downto 0)
@@ -45,8 +49,18 @@ architecture rtl of firm_float_product is
   constant RANGE_BITS : positive := EXPONENT_BITS + 2;
   constant LIMB       : positive := 18;
   constant LIMBS      : positive := (MANTISSA_BITS + LIMB) / LIMB;
-  -- Decoding, products of limbs, rows; then one register for each further row.
-  constant STAGES     : positive := LIMBS + 2;
+
+  -- Registers of the sums: one for each further row, or one for all.
+  function sum_stages return natural is
+  begin
+    if IS_SHORT and LIMBS > 2 then
+      return 1;
+    end if;
+    return LIMBS - 1;
+  end function sum_stages;
+
+  -- Decoding, products of limbs, rows; then those of the sums.
+  constant STAGES     : positive := sum_stages + 3;
   constant SIDE       : positive := REST + RANGE_BITS + 3;
 
   subtype mantissa_t is unsigned(LIMBS*LIMB-1 downto 0);
@@ -72,6 +86,8 @@ architecture rtl of firm_float_product is
   signal rows_r     : rows_t(LIMBS*LIMBS-1 downto 0);
   -- Sum k includes the rows 0 to k.
   signal sums       : sums_t(LIMBS-1 downto 0);
+  -- Row k, when it is added, in its place.
+  signal placed     : sums_t(LIMBS-1 downto 1);
   signal valids_r   : std_logic_vector(STAGES-1 downto 0);
   signal sides_r    : sides_t(STAGES-1 downto 0);
 
@@ -98,7 +114,7 @@ begin
         b_kind   := kind_of(in_b, EXPONENT_BITS);
         kind     := FINITE;
         exponent := exponent_of(in_a, EXPONENT_BITS, RANGE_BITS) + exponent_of(in_b, EXPONENT_BITS, RANGE_BITS)
-                    - (bias_of(EXPONENT_BITS) - 1);
+                    - (bias_of(EXPONENT_BITS) - 1 + LESS);
         if a_kind = UNDEFINED or b_kind = UNDEFINED then
           kind := UNDEFINED;
         elsif a_kind = INFINITE or b_kind = INFINITE then
@@ -107,7 +123,7 @@ begin
             kind := UNDEFINED;
           end if;
         elsif is_zero(in_a) or is_zero(in_b) then
-          exponent := to_signed(1, RANGE_BITS);
+          exponent := to_signed(1 - LESS, RANGE_BITS);
         end if;
         valids_r   <= valids_r(STAGES-2 downto 0) & in_valid;
         sides_r(0) <= (in_a(in_a'left) xor in_b(in_b'left)) & kind & std_logic_vector(exponent) & in_rest;
@@ -159,14 +175,28 @@ begin
 
   each_row : for k in 1 to LIMBS-1 generate
 
-    add : process (clk)
-    begin
-      if rising_edge(clk) then
-        if advance = '1' then
-          sums(k) <= sums(k-1) + shift_left(resize(rows_r((k-1)*LIMBS+k), 2*LIMBS*LIMB), LIMB*k);
+    in_turn : if not IS_SHORT or k = LIMBS-1 generate
+      add : process (clk)
+      begin
+        if rising_edge(clk) then
+          if advance = '1' then
+            sums(k) <= sums(k-1) + placed(k);
+          end if;
         end if;
-      end if;
-    end process add;
+      end process add;
+    end generate in_turn;
+
+    at_once : if IS_SHORT and k < LIMBS-1 generate
+      sums(k) <= sums(k-1) + placed(k);
+    end generate at_once;
+
+    waiting : if not IS_SHORT generate
+      placed(k) <= shift_left(resize(rows_r((k-1)*LIMBS+k), 2*LIMBS*LIMB), LIMB*k);
+    end generate waiting;
+
+    ready : if IS_SHORT generate
+      placed(k) <= shift_left(resize(rows_r(k), 2*LIMBS*LIMB), LIMB*k);
+    end generate ready;
 
   end generate each_row;
 

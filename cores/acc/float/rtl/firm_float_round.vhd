@@ -49,7 +49,6 @@ architecture rtl of firm_float_round is
   constant RIGHT_LEVELS : positive := levels_for(FITTED_WIDTH);
   constant REST         : positive := RANGE_BITS + 3;
 
-  subtype number_t is std_logic_vector(EXPONENT_BITS+MANTISSA_BITS downto 0);
   subtype fitted_t is unsigned(FITTED_WIDTH-1 downto 0);
 
   -- Between the shifts.
@@ -68,18 +67,7 @@ architecture rtl of firm_float_round is
   signal low_magnitude   : fitted_t;
   signal low_rest        : std_logic_vector(REST-1 downto 0);
 
-  signal sum_valid_r     : std_logic;
-  signal sum_sign_r      : std_logic;
-  signal sum_kind_r      : kind_t;
-  signal sum_r           : unsigned(EXPONENT_BITS+MANTISSA_BITS-1 downto 0);
-
-  signal number_valid_r  : std_logic;
-  signal number_r        : number_t;
-
 begin
-
-  out_valid  <= number_valid_r;
-  out_number <= number_r;
 
   without_left : if MAX_LEFT = 0 generate
     moved_valid     <= in_valid;
@@ -188,57 +176,24 @@ begin
       );
   end generate with_right;
 
-  round : process (clk)
-    variable exponent : signed(RANGE_BITS-1 downto 0);
-    variable field    : unsigned(EXPONENT_BITS-1 downto 0);
-    variable up       : unsigned(0 downto 0);
-    variable sum      : unsigned(EXPONENT_BITS+MANTISSA_BITS-1 downto 0);
-  begin
-    if rising_edge(clk) then
-      if advance = '1' then
-        exponent := signed(low_rest(RANGE_BITS-1 downto 0));
-        field    := resize(unsigned(exponent), EXPONENT_BITS);
-        -- Without a leading one, the number is zero or subnormal.
-        if low_magnitude(FITTED_WIDTH-1) = '0' then
-          field := (others => '0');
-        end if;
-        up(0) := low_magnitude(1) and (low_magnitude(0) or low_magnitude(2));
-        -- A carry out of the mantissa increments the exponent, also that of a subnormal or of the largest number.
-        sum         := (field & low_magnitude(MANTISSA_BITS+1 downto 2)) + up;
-        sum_valid_r <= low_valid;
-        sum_sign_r  <= low_rest(REST-1);
-        sum_kind_r  <= low_rest(REST-2 downto REST-3);
-        sum_r       <= sum;
-        if low_magnitude(FITTED_WIDTH-1) = '1' and exponent >= 2**EXPONENT_BITS-1 and
-           low_rest(REST-2 downto REST-3) = FINITE then
-          sum_kind_r <= INFINITE;
-        end if;
-      end if;
-      if rst_n = '0' then
-        sum_valid_r <= '0';
-      end if;
-    end if;
-  end process round;
-
-  finish : process (clk)
-  begin
-    if rising_edge(clk) then
-      if advance = '1' then
-        number_valid_r <= sum_valid_r;
-        number_r       <= sum_sign_r & std_logic_vector(sum_r);
-        if sum_kind_r /= FINITE then
-          number_r(EXPONENT_BITS+MANTISSA_BITS-1 downto MANTISSA_BITS) <= (others => '1');
-          number_r(MANTISSA_BITS-1 downto 0)                           <= (others => '0');
-        end if;
-        if sum_kind_r = UNDEFINED then
-          number_r(EXPONENT_BITS+MANTISSA_BITS) <= '0';
-          number_r(MANTISSA_BITS-1)             <= '1';
-        end if;
-      end if;
-      if rst_n = '0' then
-        number_valid_r <= '0';
-      end if;
-    end if;
-  end process finish;
+  u_pack : entity firm.firm_float_pack
+    generic map (
+      EXPONENT_BITS => EXPONENT_BITS,
+      MANTISSA_BITS => MANTISSA_BITS,
+      RANGE_BITS    => RANGE_BITS,
+      IS_SHORT      => false
+    )
+    port map (
+      clk          => clk,
+      rst_n        => rst_n,
+      advance      => advance,
+      in_valid     => low_valid,
+      in_sign      => low_rest(REST-1),
+      in_kind      => low_rest(REST-2 downto REST-3),
+      in_exponent  => signed(low_rest(RANGE_BITS-1 downto 0)),
+      in_magnitude => low_magnitude,
+      out_valid    => out_valid,
+      out_number   => out_number
+    );
 
 end architecture rtl;

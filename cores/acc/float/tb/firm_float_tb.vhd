@@ -25,6 +25,8 @@ entity firm_float_tb is
     FRACTION          : natural  := 0;
     IS_SIGNED         : boolean  := true;
     TRUNCATES         : boolean  := false;
+    -- Of add, subtract and multiply.
+    IS_SHORT          : boolean  := false;
     SEED              : positive := 1;
     -- Cycles of 100 in which one side of the handshake stalls.
     STALLS            : natural  := 30
@@ -89,7 +91,8 @@ begin
     u_dut : entity firm.firm_float_add
       generic map (
         EXPONENT_BITS => EXPONENT_BITS,
-        MANTISSA_BITS => MANTISSA_BITS
+        MANTISSA_BITS => MANTISSA_BITS,
+        IS_SHORT      => IS_SHORT
       )
       port map (
         clk         => clk,
@@ -111,7 +114,8 @@ begin
     u_dut : entity firm.firm_float_multiply
       generic map (
         EXPONENT_BITS => EXPONENT_BITS,
-        MANTISSA_BITS => MANTISSA_BITS
+        MANTISSA_BITS => MANTISSA_BITS,
+        IS_SHORT      => IS_SHORT
       )
       port map (
         clk        => clk,
