@@ -35,7 +35,7 @@ PROOFS = (
         _AXIS,
         tuple({"WIDTH": 8, "DEPTH": depth} for depth in (2, 3, 4, 16)),
         2,
-        ("if level_r = DEPTH-1 then", "if level_r = DEPTH then"),
+        ("ready_r  <= not fills;", "ready_r  <= '1';"),
     ),
     _proof(
         "firm_axis_length_buffer",

@@ -42,7 +42,6 @@ architecture rtl of firm_axis_fifo is
   signal memory        : memory_t;
   signal write_index_r : natural range 0 to DEPTH-1;
   signal read_index_r  : natural range 0 to DEPTH-1;
-  signal level_r       : natural range 0 to DEPTH;
   signal ready_r       : std_logic;  -- there is room for a beat
   signal filled_r      : std_logic;  -- the memory holds a beat
   signal word_r        : std_logic_vector(WORD_BITS-1 downto 0);
@@ -50,16 +49,23 @@ architecture rtl of firm_axis_fifo is
 
   signal write_beat : std_logic;
   signal read_beat  : std_logic;
+  signal write_next : natural range 0 to DEPTH-1;
+  signal read_next  : natural range 0 to DEPTH-1;
+  signal fills      : std_logic;  -- a write without a read fills the memory
+  signal empties    : std_logic;  -- a read without a write empties it
 
+  -- A counter of bits wraps by itself; any other `mod` would be a divider.
   function next_index(index : natural) return natural is
   begin
-    if index = DEPTH-1 then
+    if 2**clog2(DEPTH) = DEPTH then
+      return (index + 1) mod DEPTH;
+    elsif index = DEPTH-1 then
       return 0;
     end if;
     return index + 1;
   end function next_index;
 
-  -- A write needs room and a read needs a beat, so they never have the same address.
+  -- With equal indices, the memory is full or empty, so there is no write or no read.
   attribute syn_ramstyle of memory      : signal is "no_rw_check";
   attribute rw_addr_collision of memory : signal is "no";
 
@@ -87,42 +93,36 @@ begin
     end if;
   end process access_memory;
 
+  write_next <= next_index(write_index_r);
+  read_next  <= next_index(read_index_r);
+  fills      <= '1' when write_next = read_index_r else '0';
+  empties    <= '1' when read_next = write_index_r else '0';
+
   count_beats : process (clk)
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
         write_index_r <= 0;
         read_index_r  <= 0;
-        level_r       <= 0;
         ready_r       <= '0';
         filled_r      <= '0';
         valid_r       <= '0';
       else
-        -- The flags depend on the former level: `m_axis_tready` may be late, so it is not in a path with an adder.
-        ready_r  <= '1';
-        filled_r <= '1';
+        -- `m_axis_tready` may be late, so it is not in a path with an adder.
         if write_beat = read_beat then
-          if level_r = DEPTH then
-            ready_r <= '0';
-          elsif level_r = 0 then
-            filled_r <= '0';
-          end if;
+          ready_r <= ready_r or not filled_r;  -- rises after reset
         elsif write_beat = '1' then
-          level_r <= level_r + 1;
-          if level_r = DEPTH-1 then
-            ready_r <= '0';
-          end if;
+          ready_r  <= not fills;
+          filled_r <= '1';
         else
-          level_r <= level_r - 1;
-          if level_r = 1 then
-            filled_r <= '0';
-          end if;
+          ready_r  <= '1';
+          filled_r <= not empties;
         end if;
         if write_beat = '1' then
-          write_index_r <= next_index(write_index_r);
+          write_index_r <= write_next;
         end if;
         if read_beat = '1' then
-          read_index_r <= next_index(read_index_r);
+          read_index_r <= read_next;
         end if;
         valid_r <= read_beat or (valid_r and not m_axis_tready);
       end if;
