@@ -166,8 +166,8 @@ class Instantiated:
 def module_of(entity: Entity, translated: Mapping[Use, Module]) -> str:
     """Return the Verilog of the module that stands for an entity and contains its translations."""
     names = {name for use in translated for name, _ in use.literals}
-    parameters = {name: item.parameter for name, item in entity.generics.items() if name in names}
-    modules = _by_condition(entity, translated, parameters)
+    defaults = {name: item.parameter for name, item in entity.generics.items() if name in names}
+    modules = _by_condition(entity, translated, defaults)
     ports = list(_ports(entity, modules))
     translations = [
         {
@@ -180,12 +180,23 @@ def module_of(entity: Entity, translated: Mapping[Use, Module]) -> str:
     ]
     context = {
         "name": identifier(entity.name),
-        "parameters": [{"name": name, "value": value} for name, value in parameters.items()],
+        "parameters": [{"name": name, "value": value} for name, value in _used(translated, defaults).items()],
         "ports": [port for port, _ in ports],
         "translations": translations,
         "missing": f"{entity.name}_is_not_translated_with_these_parameters",
     }
     return render("verilog/entity.v", context)
+
+
+def _used(translated: Iterable[Use], defaults: Mapping[str, str]) -> Mapping[str, str]:
+    """Return defaults of the parameters with which the module has a translation, if there are such.
+
+    Yosys checks a module with its defaults, too. Those that no instance relies on may be others than the entity's.
+    """
+    given = [dict(use.literals) for use in translated]
+    needed = {name: value for name, value in defaults.items() if not all(name in values for values in given)}
+    sets = ({**defaults, **values} for values in given)
+    return next((values for values in sets if needed.items() <= values.items()), defaults)
 
 
 def _by_condition(entity: Entity, translated: Mapping[Use, Module], parameters: Mapping[str, str]) -> dict[str, Module]:

@@ -82,6 +82,22 @@ def test_each_set_of_parameters_is_translated(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.check
+@pytest.mark.parametrize("further", ["", "  step u_q (.A(a[3:0]), .sum(q));\n"])
+def test_yosys_needs_no_translation_of_defaults_without_use(tmp_path: Path, further: str) -> None:
+    """Yosys checks a module with its defaults, too, whether or not an instance relies on them."""
+    (tmp_path / "step.vhd").write_text(STEP)
+    top = tmp_path / "top.v"
+    top.write_text(
+        "module top (input [7:0] a, output [8:0] p, output [4:0] q);\n"
+        f"  step #(.BITS(8), .FACTOR(2)) u_p (.A(a), .sum(p));\n{further}endmodule\n"
+    )
+    made = netlist("top", tmp_path, [tmp_path / "step.vhd"], verilog=[top])
+    script = f"read_verilog {made} {top}; hierarchy -check -top top"
+    done = subprocess.run(["yosys", "-q", "-p", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize(
     ("instance", "message"),
     [
