@@ -316,7 +316,9 @@ class _Ghdl:
 
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """Run a GHDL command; return the text on standard output and on standard error."""
-        options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
+        # Such as -frelaxed, without which VHDL-2008 has no shared variable of a plain type.
+        of_language = [option for option in self.translation.options if option.startswith("-f")]
+        options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}", *of_language]
         with (
             tempfile.TemporaryFile() as errors,
             subprocess.Popen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,18 @@ def test_a_memory_keeps_its_attributes_for_synthesis(tmp_path: Path) -> None:
     assert not translate(Translation("ram", str(output), {"work": [str(source)]}, {}), tmp_path / "ghdl")
     (line,) = [line for line in output.read_text().splitlines() if "[0:255]" in line]
     assert line == '  (* syn_ramstyle = "no_rw_check" *) reg [7:0] words [0:255];'
+
+
+def test_options_of_the_language_reach_the_analysis(tmp_path: Path) -> None:
+    source, output = tmp_path / "ram.vhd", tmp_path / "ram.v"
+    shared = "shared variable words : words_t := (others => (others => '0'));"
+    text = _MEMORY.replace("signal words : words_t;", shared).replace("<= x;", ":= x;")
+    source.write_text(re.sub(r"  attribute .*\n", "", text))
+    strict = Translation("ram", str(output), {"work": [str(source)]}, {}, std="08")
+    with pytest.raises(NetlistError, match="protected type"):
+        translate(strict, tmp_path / "ghdl")
+    translate(replace(strict, options=["-frelaxed"]), tmp_path / "ghdl")
+    assert output.exists()
 
 
 def test_an_error_has_its_place_in_the_source(tmp_path: Path) -> None:
