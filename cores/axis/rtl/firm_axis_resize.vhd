@@ -58,8 +58,9 @@ begin
 
   widen : if S_WIDTH < M_WIDTH generate
 
-    -- A one marks the next piece.
-    signal place_r : std_logic_vector(PIECES-1 downto 0);
+    -- Ones mark the pieces that have arrived, and the next one.
+    signal came_r  : std_logic_vector(PIECES-2 downto 0);
+    signal is_next : std_logic_vector(PIECES-1 downto 0);
     -- The pieces before the last one; missing ones are zero.
     signal rest_r  : std_logic_vector(M_WIDTH-NARROW-1 downto 0);
     signal is_done : std_logic;  -- with this piece the beat is complete
@@ -67,27 +68,25 @@ begin
 
   begin
 
-    is_done       <= place_r(PIECES-1) or s_axis_tlast;
+    is_next       <= (came_r & '1') and not ('0' & came_r);
+    is_done       <= came_r(PIECES-2) or s_axis_tlast;
     s_axis_tready <= m_axis_tready or not is_done;
     taken         <= s_axis_tvalid and (m_axis_tready or not is_done);
     m_axis_tvalid <= s_axis_tvalid and is_done;
     m_axis_tlast  <= s_axis_tlast;
 
-    join : process (place_r, rest_r, s_axis_tdata, s_axis_tkeep)
-      variable came : std_logic;  -- the piece came before this one
+    join : process (came_r, is_next, rest_r, s_axis_tdata, s_axis_tkeep)
     begin
-      came := '0';
-      for piece in PIECES-1 downto 0 loop
-        m_axis_tdata(NARROW*piece+NARROW-1 downto NARROW*piece) <= (others => '0');
+      m_axis_tdata <= std_logic_vector(resize(unsigned(rest_r), M_WIDTH));
+      m_axis_tkeep <= (others => '0');
+      for piece in 0 to PIECES-1 loop
         if piece < PIECES-1 then
-          m_axis_tdata(NARROW*piece+NARROW-1 downto NARROW*piece) <= rest_r(NARROW*piece+NARROW-1 downto NARROW*piece);
+          m_axis_tkeep(LANES*piece+LANES-1 downto LANES*piece) <= (others => came_r(piece));
         end if;
-        m_axis_tkeep(LANES*piece+LANES-1 downto LANES*piece) <= (others => came);
-        if place_r(piece) = '1' then
+        if is_next(piece) = '1' then
           m_axis_tdata(NARROW*piece+NARROW-1 downto NARROW*piece) <= s_axis_tdata;
           m_axis_tkeep(LANES*piece+LANES-1 downto LANES*piece)    <= s_axis_tkeep;
         end if;
-        came := came or place_r(piece);
       end loop;
     end process join;
 
@@ -95,13 +94,13 @@ begin
     begin
       if rising_edge(clk) then
         if rst_n = '0' or is_open = '0' or (taken = '1' and is_done = '1') then
-          place_r    <= (others => '0');
-          place_r(0) <= '1';
-          rest_r     <= (others => '0');
+          came_r <= (others => '0');
+          rest_r <= (others => '0');
         elsif taken = '1' then
-          place_r <= place_r(PIECES-2 downto 0) & '0';
+          came_r <= std_logic_vector(shift_left(unsigned(came_r), 1));
+          came_r(0) <= '1';
           for piece in 0 to PIECES-2 loop
-            if place_r(piece) = '1' then
+            if is_next(piece) = '1' then
               rest_r(NARROW*piece+NARROW-1 downto NARROW*piece) <= s_axis_tdata;
             end if;
           end loop;
