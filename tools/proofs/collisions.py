@@ -11,9 +11,10 @@ import re
 
 _MODULE = re.compile(r"^module .*?^endmodule$", re.MULTILINE | re.DOTALL)
 _MEMORY = re.compile(r'^  \(\* syn_ramstyle = "no_rw_check".*?\*\) reg (\[\d+:0\] )?(\w+)\[\d+:0\]', re.MULTILINE)
-# As GHDL writes the ports of a memory: the condition, which may be missing, and the address.
+# As GHDL writes the ports of a memory: the condition, which may be missing, and the address. A port without a clock is
+# before a register with a reset, which synthesis makes part of it.
 _WRITE = r"^  always @\(posedge \w+\)\n(?:    if \((.*)\)\n)?\s+{}\[(.*)\] <= "
-_READ = r"(^  always @\(posedge \w+\)\n(?:    if \((.*)\)\n)?\s+\w+ <= )({}\[(.*)\]);$"
+_READ = r"(^  (?:always @\(posedge \w+\)\n(?:    if \((.*)\)\n)?\s+\w+ <=|assign \w+ =) )({}\[(.*)\]);$"
 
 
 def with_collisions(netlist: str) -> str:

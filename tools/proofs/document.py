@@ -24,11 +24,12 @@ _SHORT = {
     "WATCHDOG": "L",
     "MAX_LENGTH": "M",
     "DEPTH": "D",
+    "INDEX_BITS": "I",
     "LONGEST": "B",
     "SAMPLES": "S",
 }
 # Generics that a table says if they are true.
-_CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest"}
+_CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest", "SHARED_READ": "shared_read"}
 
 
 def tables() -> str:

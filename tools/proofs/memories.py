@@ -29,7 +29,24 @@ def _proof(
     )
 
 
+_TALLY = "firm_status_tally.vhd"
+_TALLIED = Proof(
+    "tally",
+    "firm_status_tally",
+    (*_AXIS, "sched/package", "status/status"),
+    sizes=tuple(
+        {"INDEX_BITS": 1, "COUNT_BITS": 2, "LONGEST_BITS": 1, "SHARED_READ": shared} for shared in (False, True)
+    ),
+    depth=12,
+    mutations=(
+        Mutation(_TALLY, "hit_r <= valid_r;", "hit_r <= '0';", ("counts_all", "keeps_the_longest")),
+        Mutation(_TALLY, "was_valid_r <= valid_r;", "was_valid_r <= '0';", ("counts_all",), 1),
+    ),
+    is_bounded=True,
+)
+
 PROOFS = (
+    _TALLIED,
     _proof(
         "firm_axis_fifo",
         _AXIS,

@@ -6,6 +6,8 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 entity firm_status_tally is
   generic (
@@ -59,12 +61,18 @@ architecture rtl of firm_status_tally is
   signal was_index_r   : std_logic_vector(INDEX_BITS-1 downto 0);
   signal was_word_r    : std_logic_vector(WORD_BITS-1 downto 0);
   signal read_word     : std_logic_vector(WORD_BITS-1 downto 0);
+  -- The word that was read outside was written in the same cycle.
+  signal hit_r         : std_logic;
 
   signal old_word      : std_logic_vector(WORD_BITS-1 downto 0);
   signal new_word      : std_logic_vector(WORD_BITS-1 downto 0);
   signal write_enable  : std_logic;
   signal write_index   : std_logic_vector(INDEX_BITS-1 downto 0);
   signal write_word    : std_logic_vector(WORD_BITS-1 downto 0);
+
+  -- A word that is read and written in the same cycle is taken from `was_word_r`.
+  attribute syn_ramstyle of memory      : signal is "no_rw_check";
+  attribute rw_addr_collision of memory : signal is "no";
 
 begin
 
@@ -99,14 +107,18 @@ begin
   end process write_memory;
 
   own_port : if not SHARED_READ generate
+    signal read_r : std_logic_vector(WORD_BITS-1 downto 0);
+  begin
+    read_word <= was_word_r when hit_r = '1' else read_r;
+
     read_memory : process (clk)
     begin
       if rising_edge(clk) then
-        word_r    <= memory(to_integer(unsigned(op_index)));
-        read_word <= memory(to_integer(unsigned(read_index)));
+        word_r <= memory(to_integer(unsigned(op_index)));
+        read_r <= memory(to_integer(unsigned(read_index)));
         if is_clear_r /= '1' then
-          word_r    <= (others => '0');
-          read_word <= (others => '0');
+          word_r <= (others => '0');
+          read_r <= (others => '0');
         end if;
       end if;
     end process read_memory;
@@ -118,7 +130,9 @@ begin
     signal kept_r     : std_logic_vector(WORD_BITS-1 downto 0);
   begin
     index     <= op_index when op_valid = '1' else read_index;
-    read_word <= word_r when was_read_r = '1' else kept_r;
+    read_word <= kept_r when was_read_r = '0' else
+                 was_word_r when hit_r = '1' else
+                 word_r;
 
     read_memory : process (clk)
     begin
@@ -142,6 +156,10 @@ begin
       longest_r   <= op_longest;
       was_index_r <= index_r;
       was_word_r  <= new_word;
+      hit_r       <= '0';
+      if index_r = read_index then
+        hit_r <= valid_r;
+      end if;
       valid_r     <= op_valid and is_clear_r;
       was_valid_r <= valid_r;
       if rst_n = '0' then
