@@ -28,6 +28,7 @@ from tools.bench import (
     loops,
     manager,
     network,
+    peers,
     replay,
     resize,
     simulators,
@@ -67,7 +68,7 @@ def main() -> int:
         nargs="+",
         default=SEEDS,
         metavar="N",
-        help="for timing and network: of placements (default: 1 2 3)",
+        help="for timing, network and peers: of placements (default: 1 2 3)",
     )
     arguments = parser.parse_args()
     if unknown := set(arguments.parts) - set(figures.parts()):
@@ -78,6 +79,9 @@ def main() -> int:
     is_good = True
     for part in figures.parts():
         if arguments.parts and part not in arguments.parts:
+            continue
+        if part == "peers" and not peers.folders():
+            _tell(peers.WITHOUT_FOLDERS)
             continue
         tables = _measure(part, arguments)
         is_good = is_good and all(table.is_good for table in tables)
@@ -98,6 +102,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "network": lambda: network.measure(
             Nextpnr(Yosys(), device=network.DEVICE), _tell, figures.written(), arguments.row, arguments.seeds
         ),
+        "peers": lambda: peers.measure(Nextpnr(Yosys()), _tell, arguments.seeds),
         "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),
         "use": lambda: use.measure(seed, _tell),
         "cycles": lambda: cycles.measure(seed, _tell),

@@ -25,6 +25,7 @@ from tools.bench import (
     manager,
     network,
     nextpnr,
+    peers,
     replay,
     resize,
     simulators,
@@ -69,6 +70,12 @@ PAGES = (
         "the clock of converters, systems, the Manager and arithmetic",
         ("timing",),
     ),
+    Page(
+        "peers",
+        "Figures beside other libraries",
+        "the area and the clock of our parts of streams beside those of others",
+        ("peers",),
+    ),
     Page("channel-use", "Figures of channel use", "how many cycles of the channel each scheduler uses", ("use",)),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
     Page(
@@ -85,6 +92,7 @@ _HEADINGS = {
     "area": "Area",
     "manager": "Area of Manager and schedulers",
     "timing": "Timing",
+    "peers": "Peers",
     "use": "Channel use",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
@@ -115,6 +123,10 @@ _METHODS = {
         a carry cell counts as the two LUT4 that it occupies.
         `make bench BENCH='timing --row "Image.* 64 bits"'` measures only the rows whose names match. A design that is
         unchanged since its last measurement is not placed again.""",
+    "peers": """Each part has the same ports and sizes in every library. LUT, FF and MHz are measured as in
+        [Timing](timing.md#timing). `make bench BENCH=peers VERILOG_AXIS=DIR OPEN_LOGIC=DIR` names the folders with
+        [verilog-axis](https://github.com/alexforencich/verilog-axis) and
+        [Open Logic](https://github.com/open-logic/open-logic).""",
     "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
@@ -175,6 +187,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         links,
         applications,
         network,
+        peers,
         systems,
         builds,
         actions,
@@ -237,9 +250,10 @@ def _versions(part: str) -> str:
         tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
-    elif part in ("area", "manager", "timing", "network", "links", "applications"):
+    elif part in ("area", "manager", "timing", "network", "peers", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
-        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "network") else []
+        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "network", "peers") else []
+        tools += peers.versions() if part == "peers" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
     return ", ".join(tools)
