@@ -73,7 +73,7 @@ PAGES = (
     Page(
         "peers",
         "Figures beside other libraries",
-        "the area and the clock of our parts of streams beside those of others",
+        "area and clock of our parts of streams beside those of others",
         ("peers",),
     ),
     Page("channel-use", "Figures of channel use", "how many cycles of the channel each scheduler uses", ("use",)),
