@@ -7,6 +7,9 @@ check of the netlist, find what they are there for is shown by breaking the cros
 from __future__ import annotations
 
 import random
+import re
+import shutil
+import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -260,6 +263,41 @@ def test_every_path_between_the_clocks_is_synchronised(tmp_path: Path, entity: s
     library = _library(tmp_path, is_sure=True)
     verilog = library.synthesise(entity, GENERICS[entity], "verilog")
     assert unsynchronised(verilog, entity, tmp_path, DOMAINS) == []
+
+
+# Synthesis to gates without initial values, which keep Yosys from merging registers, and the registers after it.
+EQUAL = (
+    "proc; flatten; setattr -unset init w:*; opt -full; memory_map; simplemap t:$*dff* t:$xor t:$add; techmap; "
+    "opt_clean; tee -o before.txt select -count t:$_*DFF*; "
+    "opt -full -share_all; opt_clean; tee -o after.txt select -count t:$_*DFF*"
+)
+
+
+@pytest.mark.skipif(not shutil.which("yosys"), reason="Yosys is not installed")
+@pytest.mark.parametrize("entity", ["firm_cdc_stream", "firm_cdc_message"])
+def test_no_register_equals_another(tmp_path: Path, entity: str) -> None:
+    """Synthesis might keep one of two, and its name would not be that in the constraints."""
+    verilog = _library(tmp_path, is_sure=True).synthesise(entity, GENERICS[entity], "verilog")
+    (tmp_path / "netlist.v").write_text(verilog, encoding="utf-8")
+    script = f"read_verilog netlist.v; hierarchy -top {entity}; {EQUAL}"
+    subprocess.run(["yosys", "-q", "-p", script], cwd=tmp_path, check=True)
+    before, after = ((tmp_path / f"{name}.txt").read_text() for name in ("before", "after"))
+    assert before == after
+    assert int(before.split()[0]) > 30
+
+
+@pytest.mark.parametrize(
+    ("entity", "registers"),
+    [("firm_cdc_stream", ("write_gray_r", "read_gray_r")), ("firm_cdc_message", ("request_r", "answer_r"))],
+)
+def test_no_tool_merges_registers_that_constraints_name(entity: str, registers: tuple[str, str]) -> None:
+    text = (CORES / "cdc" / "rtl" / f"{entity}.vhd").read_text(encoding="ascii")
+    kept = {
+        attribute: set(re.split(r",\s*", names))
+        for attribute, names in re.findall(r"attribute (\w+) of (.*?)\s*: signal is", text)
+    }
+    # Of Vivado, Quartus (twice) and Synplify with its relatives.
+    assert kept == dict.fromkeys(("dont_touch", "preserve", "dont_merge", "syn_preserve"), {*registers})
 
 
 @pytest.mark.check

@@ -83,6 +83,16 @@ architecture rtl of firm_cdc_message is
   signal is_fallen : std_logic;  -- the message was withdrawn
   signal visible   : levels_t;
 
+  -- Constraints name these registers, so no tool may merge, duplicate or move them.
+  attribute dont_touch   : string;
+  attribute preserve     : boolean;
+  attribute dont_merge   : boolean;
+  attribute syn_preserve : boolean;
+  attribute dont_touch of request_r, answer_r   : signal is "true";
+  attribute preserve of request_r, answer_r     : signal is true;
+  attribute dont_merge of request_r, answer_r   : signal is true;
+  attribute syn_preserve of request_r, answer_r : signal is true;
+
 begin
 
   assert SEGMENTS >= 1

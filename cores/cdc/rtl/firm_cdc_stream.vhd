@@ -62,6 +62,7 @@ architecture rtl of firm_cdc_stream is
   -- A pointer has one bit more than an index, to distinguish a full FIFO from an empty one.
   constant POINTER_BITS : positive := INDEX_BITS + 1;
 
+  subtype index_t is unsigned(INDEX_BITS-1 downto 0);
   subtype pointer_t is unsigned(POINTER_BITS-1 downto 0);
   subtype gray_t is std_logic_vector(POINTER_BITS-1 downto 0);
   type memory_t is array (0 to DEPTH-1) of std_logic_vector(WORD_BITS-1 downto 0);
@@ -71,6 +72,13 @@ architecture rtl of firm_cdc_stream is
   begin
     return std_logic_vector(pointer xor ('0' & pointer(POINTER_BITS-1 downto 1)));
   end function gray_of;
+
+  -- The pointer after one that is stored as its index and in Gray code, whose highest bit is that of the pointer. Two
+  -- registers of this bit would be equal, and synthesis might then drop the one that crosses.
+  function next_of(index : index_t; gray : gray_t) return unsigned is
+  begin
+    return (gray(POINTER_BITS-1) & index) + 1;
+  end function next_of;
 
   signal memory : memory_t;
 
@@ -83,7 +91,7 @@ architecture rtl of firm_cdc_stream is
   signal enabled      : std_logic;  -- a beat of the source, once the sink is ready for it
   signal narrow_ready : std_logic;
   signal write        : std_logic;
-  signal write_r      : pointer_t := (others => '0');
+  signal write_r      : index_t := (others => '0');
   signal write_gray_r : gray_t;
   signal read_seen    : gray_t;
   signal is_full      : std_logic;
@@ -92,13 +100,23 @@ architecture rtl of firm_cdc_stream is
 
   -- Of the sink's domain
   signal read         : std_logic;
-  signal read_r       : pointer_t := (others => '0');
+  signal read_r       : index_t := (others => '0');
   signal read_gray_r  : gray_t;
   signal write_seen   : gray_t;
   signal has_beat     : std_logic;
   signal word         : std_logic_vector(WORD_BITS-1 downto 0);
   signal word_tvalid  : std_logic;
   signal word_tready  : std_logic;
+
+  -- Constraints name these registers, so no tool may merge, duplicate or move them.
+  attribute dont_touch   : string;
+  attribute preserve     : boolean;
+  attribute dont_merge   : boolean;
+  attribute syn_preserve : boolean;
+  attribute dont_touch of write_gray_r, read_gray_r   : signal is "true";
+  attribute preserve of write_gray_r, read_gray_r     : signal is true;
+  attribute dont_merge of write_gray_r, read_gray_r   : signal is true;
+  attribute syn_preserve of write_gray_r, read_gray_r : signal is true;
 
 begin
 
@@ -158,11 +176,12 @@ begin
   remember : process (s_clk)
   begin
     if rising_edge(s_clk) and write = '1' then
-      memory(to_integer(write_r(INDEX_BITS-1 downto 0))) <= wide_tlast & wide_tkeep & wide_tdata;
+      memory(to_integer(write_r)) <= wide_tlast & wide_tkeep & wide_tdata;
     end if;
   end process remember;
 
   advance_write : process (s_clk)
+    variable next_write : pointer_t;
   begin
     if rising_edge(s_clk) then
       if s_rst_n = '0' then
@@ -171,8 +190,9 @@ begin
         last_r       <= '0';
       else
         if write = '1' then
-          write_r      <= write_r + 1;
-          write_gray_r <= gray_of(write_r + 1);
+          next_write   := next_of(write_r, write_gray_r);
+          write_r      <= next_write(INDEX_BITS-1 downto 0);
+          write_gray_r <= gray_of(next_write);
         end if;
         -- A beat that is no longer offered was withdrawn with its message.
         last_r <= (write and wide_tlast) or (last_r and wide_tvalid and not is_drained);
@@ -193,19 +213,21 @@ begin
     );
 
   has_beat    <= '1' when read_gray_r /= write_seen else '0';
-  word        <= memory(to_integer(read_r(INDEX_BITS-1 downto 0)));
+  word        <= memory(to_integer(read_r));
   word_tvalid <= has_beat and m_open and m_rst_n;
   read        <= has_beat and (word_tready or not m_open);
 
   advance_read : process (m_clk)
+    variable next_read : pointer_t;
   begin
     if rising_edge(m_clk) then
       if m_rst_n = '0' then
         read_r      <= (others => '0');
         read_gray_r <= (others => '0');
       elsif read = '1' then
-        read_r      <= read_r + 1;
-        read_gray_r <= gray_of(read_r + 1);
+        next_read   := next_of(read_r, read_gray_r);
+        read_r      <= next_read(INDEX_BITS-1 downto 0);
+        read_gray_r <= gray_of(next_read);
       end if;
     end if;
   end process advance_read;
