@@ -39,8 +39,9 @@ _DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTA
 _GENERIC_MAP = re.compile(r"^  \S+ #\(\n(.*?)\)\n +(\S+) \($", re.MULTILINE | re.DOTALL)
 _GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
 # GHDL compares numbers with bounds that they cannot exceed, and packs signals that form no loop into one vector; a
-# module may have ports that exist only for one ROS version of its message. Linters should check only hand-written code.
-_WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
+# module may have ports that exist only for one ROS version of its message. A port may have a name of C++, such as
+# `abort`, which Verilator renames. Linters should check only hand-written code.
+_WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING", "SYMRSVDWORD")
 _HEADER = "\n".join(
     [
         "// Generated from VHDL by GHDL; edit the VHDL instead.",
