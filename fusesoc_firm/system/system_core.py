@@ -42,7 +42,11 @@ from fusesoc_firm.system.boards.board import (
     read_board,
 )
 from fusesoc_firm.system.boards.pll import PLL_TEMPLATES
-from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
+from fusesoc_firm.system.boards.timing_constraints import (
+    CHECKS_TEMPLATE,
+    checks_configuration,
+    clocks_configuration,
+)
 from fusesoc_firm.system.derived.actions import with_actions
 from fusesoc_firm.system.derived.cpp_function import function_name
 from fusesoc_firm.system.derived.derivation import derive, source_files
@@ -340,6 +344,8 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
         script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
         files[f"{function_name(type_)}.tcl"] = GeneratedFile(script, "user")
     files |= _clock_files(loaded, board, "xdc", "xdc", "/")
+    checks = render(CHECKS_TEMPLATE, checks_configuration(system, board, clock))
+    files[f"{board.name}_checks.tcl"] = GeneratedFile(checks, "user")
     records = render(RECORDS_TEMPLATE, records_configuration(system))
     files[f"{records_entity(system)}.vhd"] = GeneratedFile(records, VHDL)
     design = render(BLOCK_DESIGN_TEMPLATE, block_design_configuration(system, board, clock))

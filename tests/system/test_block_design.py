@@ -58,6 +58,7 @@ def test_what_comes_for_a_processor(tmp_path: Path) -> None:
         "turn/src/turn.hpp": "user",
         "turn.tcl": "user",
         "zynq7000.xdc": "xdc",
+        "zynq7000_checks.tcl": "user",
         "robot_zynq7000.tcl": "tclSource",
     }
     # Vivado reads it last: it refers to the top level.

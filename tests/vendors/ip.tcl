@@ -142,11 +142,13 @@ ip proc_sys_reset {
   pin peripheral_aresetn O reset_n 1
 }
 
-# PB041 (Concat, 2.1).
-ip xlconcat {
-  property NUM_PORTS 2 {1 .. 32}
-  for {set number 0} {$number < 32} {incr number} {
-    pin In$number I data 1 "\$NUM_PORTS > $number"
+# PB041 (Concat, 2.1); UG994 for the inline utility with the same properties and pins.
+foreach name {xlconcat ilconcat} {
+  ip $name {
+    property NUM_PORTS 2 {1 .. 32}
+    for {set number 0} {$number < 32} {incr number} {
+      pin In$number I data 1 "\$NUM_PORTS > $number"
+    }
+    pin dout O data {$NUM_PORTS}
   }
-  pin dout O data {$NUM_PORTS}
 }

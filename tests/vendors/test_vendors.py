@@ -7,6 +7,7 @@ and properties. A script that is broken in any way that they know of must be fou
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -90,19 +91,20 @@ class Project:
         (path,) = (self.folder / "src").rglob(name)
         return path
 
-    def check(self, script: Path | None = None) -> subprocess.CompletedProcess[str]:
-        """Run the project's script with commands that check."""
+    def check(self, **variables: str) -> subprocess.CompletedProcess[str]:
+        """Run the project's script with commands that check; `variables` are those of `vivado.tcl`."""
         return subprocess.run(
-            ["tclsh", str(TOOLS / f"{self.tool}.tcl"), str(script or self.script)],
+            ["tclsh", str(TOOLS / f"{self.tool}.tcl"), str(self.script)],
             cwd=self.folder,
+            env={**os.environ, **variables},
             capture_output=True,
             text=True,
             check=False,
         )
 
-    def lines(self) -> list[str]:
+    def lines(self, **variables: str) -> list[str]:
         """What a script without faults makes."""
-        done = self.check()
+        done = self.check(**variables)
         assert done.returncode == 0, done.stderr
         return done.stdout.splitlines()
 
@@ -240,7 +242,13 @@ DESIGN = "robot_zynq7000.bd"
         ("-type module -reference robot_system", "-type module -reference robots", "there is no entity robots"),
         ("update_compile_order -fileset sources_1\n", "", "the hierarchy of sources is not known yet"),
         ("ip:smartconnect control", "ip:smart_connect control", "unknown IP xilinx.com:ip:smart_connect"),
-        ("create_bd_cell -type ip -vlnv xilinx.com:ip:xlconcat interrupts\n", "", "there is no cell interrupts"),
+        ("ilconcat:1.0 interrupts", "ilconcat:1.0 interrupt", "there is no cell interrupts"),
+        ("inline_hdl:ilconcat:1.0", "ip:xlconcat", "unknown IP xilinx.com:ip:xlconcat"),
+        ("BUSIF s_axis:m_axis:s_axi", "BUSIF s_axis:s_axi", "BD 41-967: AXI interface pin system/m_axis is not"),
+        ("BUSIF s_axis:m_axis:s_axi", "BUSIF s_axis:m_axi", "there is no interface system/m_axi"),
+        ("STEPS.ROUTE_DESIGN.TCL.POST", "STEPS.ROUTE.TCL.POST", "unknown property STEPS.ROUTE.TCL.POST of impl_1"),
+        ("zynq7000_checks.tcl", "checks.tcl", "there is no file"),
+        ("[get_runs impl_1]", "[get_runs impl]", "there is no run impl"),
         ("CONFIG.NUM_SI 3", "CONFIG.NUM_S 3", "unknown property NUM_S of smartconnect"),
         ("CONFIG.NUM_SI 3", "CONFIG.NUM_SI 17", "NUM_SI of memory cannot be 17"),
         ("CONFIG.NUM_SI 3", "CONFIG.NUM_SI 2", "memory/S02_AXI is not there, as the properties are"),
@@ -294,6 +302,46 @@ DESIGN = "robot_zynq7000.bd"
 )
 def test_a_broken_design_is_found(project: Project, old: str, new: str, message: str) -> None:
     assert message in project.fault("robot_zynq7000.tcl", old, new)
+
+
+@pytest.mark.parametrize("release", ["2023.2", "2024.1", "2024.2", "2025.1", "2025.2", "2026.1"])
+def test_every_release_has_what_a_design_uses(project: Project, release: str) -> None:
+    lines = project.lines(VIVADO_VERSION=release)
+    assert f"cell interrupts {'ilconcat' if release == '2026.1' else 'xlconcat'}" in lines
+    assert "cdc robot_zynq7000_cdc.rpt" in lines
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("max", "the worst setup slack is -0.123 ns, from from/C to to/D"),
+        ("min", "the worst hold slack is -0.123 ns, from from/C to to/D"),
+        ("path", "the path between clk_fpga_0 and clk_fpga_1, from from/C to to/D, belongs to no crossing"),
+        ("skew", "the bits of a pointer between two clocks have more skew than set_bus_skew allows"),
+        *(
+            (f"{name}_reg*", f"no register has the name {name}_reg*, so its constraint has no effect")
+            for name in (
+                "u_left_to_first_in_crossing/request_r",
+                "u_left_to_first_in_crossing/u_return/first_r",
+                "u_first_level_sync/first_r",
+                "u_rst_odd/first_r",
+            )
+        ),
+    ],
+)
+def test_a_routed_design_with_faults_ends_the_build(project: Project, fault: str, message: str) -> None:
+    done = project.check(VIVADO_FINDS=fault)
+    assert done.returncode == 1
+    assert f"ERROR: {message}" in done.stdout
+    assert "the routed design has" in done.stderr
+
+
+def test_the_checks_name_the_registers_of_the_constraints(project: Project) -> None:
+    """All but fields, of which a system may use none."""
+    names = set(re.findall(r"^  (\S+_reg\*)$", project.generated("zynq7000_checks.tcl").read_text(), re.MULTILINE))
+    constraints = project.generated("zynq7000.xdc").read_text(encoding="utf-8")
+    named = set(re.findall(r"NAME =~ \*/(\S+?_reg\*)(?:/D)?\}", constraints))
+    assert names == {name for name in named if not name.endswith(("fields_r_reg*", "memory_reg*"))}
 
 
 def test_a_broken_project_is_found(project: Project) -> None:

@@ -2,6 +2,9 @@
 #
 #   tclsh vivado.tcl PROJECT.tcl      in the work folder; writes a line a cell, net and port
 #
+# The variable VIVADO_VERSION is the release, 2026.1 if it is not set. After that, the checks of the routed design run,
+# in which VIVADO_FINDS are faults.
+#
 # A command that is not here is unknown to Tcl, an option or a property that is not here to `options` and `legal`.
 # Sources: UG835 (Tcl commands), UG912 (properties), UG994 (block designs), UG903 (constraints), UG1399 (Vitis HLS).
 
@@ -28,6 +31,9 @@ run_script [file join $tools ip.tcl]
 
 # --- the project ---------------------------------------------------------------------------------------------------
 
+proc variable_of {name default} { expr {[info exists ::env($name)] ? $::env($name) : $default} }
+set release [variable_of VIVADO_VERSION 2026.1]
+set finds [variable_of VIVADO_FINDS ""]
 set project {}
 set constraints {}
 set kernels {}
@@ -39,6 +45,7 @@ set project_properties {
   sources_1 {include_dirs top}
   .bd {synth_checkpoint_mode}
   .xdc {used_in_synthesis}
+  impl_1 {STEPS.ROUTE_DESIGN.TCL.POST}
 }
 set board_parts {
   tul.com.tw:pynq-z2:part0:1.0 xc7z020clg400-1 xilinx.com:zcu104:part0:1.1 xczu7ev-ffvc1156-2-e
@@ -50,6 +57,10 @@ proc current_project {} { return current_project }
 proc current_fileset {} { return sources_1 }
 proc get_filesets {name} {
   if {$name ne "sources_1"} { wrong "unknown fileset $name" }
+  return $name
+}
+proc get_runs {name} {
+  if {$name ne "impl_1"} { wrong "there is no run $name" }
   return $name
 }
 proc update_compile_order {args} { lassign [options {} {-fileset} $args]; set ::is_ordered 1 }
@@ -71,6 +82,7 @@ proc generate_target {what name} {
 }
 
 proc get_property {name object} {
+  if {[string match path_* $object]} { return [property_of_path $name $object] }
   if {$object ne "current_project" || $name ni [dict get $::project_properties $object]} {
     wrong "unknown property $name of $object"
   }
@@ -89,7 +101,14 @@ proc set_property {args} {
 }
 proc set_one {name value object} {
   if {[dict exists $::cells $object]} { return [configure $object $name $value] }
-  if {$name eq "CONFIG.ASSOCIATED_BUSIF" && [is_module_bus [file dirname $object]/$value]} return
+  if {$name eq "CONFIG.ASSOCIATED_BUSIF"} {
+    foreach bus [split $value :] {
+      set path [file dirname $object]/$bus
+      if {![is_module_bus $path] && ![is_module_stream $path]} { wrong "there is no interface $path" }
+      lappend ::associated $path
+    }
+    return
+  }
   set kind [expr {$object in $::files ? [file extension $object] : $object}]
   if {![dict exists $::project_properties $kind] || $name ni [dict get $::project_properties $kind]} {
     wrong "unknown property $name of $object"
@@ -188,6 +207,19 @@ set links {}
 set ports {}
 set design ""
 
+# Inline utilities are there from 2024.2 on, and from 2026.1 on, they have no twins among the IP.
+set inline {ilconcat}
+set replaced {xlconcat}
+proc is_available {library name} {
+  if {![dict exists $::catalog $name] || ($library eq "inline_hdl") != ($name in $::inline)} { return 0 }
+  expr {$name in $::inline ? $::release >= 2024.2 : $name in $::replaced ? $::release < 2026.1 : 1}
+}
+proc get_ipdefs {args} {
+  lassign [options {-quiet -all} {} $args] given pattern
+  lassign [split $pattern :] vendor library name version
+  expr {[is_available $library $name] ? [list $vendor:$library:$name:1.0] : {}}
+}
+
 proc create_bd_design {name} {
   set ::design $name
   lappend ::files $name.bd
@@ -203,9 +235,9 @@ proc create_bd_cell {args} {
       if {![dict exists $::entities $entity]} { wrong "there is no entity $entity" }
       dict set ::cells $cell [dict create entity $entity]
     }
-    ip {
+    ip - inline_hdl {
       lassign [split [dict get $given -vlnv] :] vendor library name version
-      if {$vendor ne "xilinx.com" || $library ne "ip" || ![dict exists $::catalog $name]} {
+      if {$vendor ne "xilinx.com" || $library ne [dict get $given -type] || ![is_available $library $name]} {
         wrong "unknown IP [dict get $given -vlnv]"
       }
       set properties {}
@@ -314,6 +346,10 @@ proc is_module_bus {path} {
   lassign [split $path /] cell name
   expr {[dict exists $::cells $cell entity] && [dict exists $::entities [dict get $::cells $cell entity] ${name}_awaddr]}
 }
+proc is_module_stream {path} {
+  lassign [split $path /] cell name
+  expr {[dict exists $::cells $cell entity] && [dict exists $::entities [dict get $::cells $cell entity] ${name}_tvalid]}
+}
 proc get_bd_intf_pins {path} {
   lassign [split $path /] cell name
   if {[is_module_bus $path]} { return $path }
@@ -377,7 +413,13 @@ proc validate_bd_design {} {
   dict set ::project validated 1
 }
 proc is_connected {pin} { expr {[dict exists $::nets $pin] || $pin in [dict values $::nets]} }
+set associated {}
 proc validate_module {cell} {
+  foreach port [dict keys [dict get $::entities [dict get $::cells $cell entity]]] {
+    if {[regexp {^(.*)_(?:tvalid|awaddr)$} $port all bus] && "$cell/$bus" ni $::associated} {
+      wrong "BD 41-967: AXI interface pin $cell/$bus is not associated to any clock pin"
+    }
+  }
   dict for {name fact} [dict get $::entities [dict get $::cells $cell entity]] {
     if {[regexp {^(s_axi)_} $name all bus] && [dict exists $::links $cell/$bus]} continue
     if {[lindex $fact 0] eq "I" && ![lindex $fact 2] && ![dict exists $::nets $cell/$name]} { wrong "input $cell/$name is not connected" }
@@ -437,13 +479,15 @@ proc get_pins {args} {
   return [string range [lindex [dict get $given -filter] 2] 2 end]
 }
 proc get_cells {args} {
-  lassign [options {-hierarchical} {-filter} $args] given
+  lassign [options {-hierarchical -quiet} {-filter} $args] given
   set filter [dict get $given -filter]
   if {![regexp {^NAME =~ \*/(u_\w+)(?:/(u_\w+))?/(?:\w+_reg\*|\* && IS_SEQUENTIAL)$} $filter all label inner]} {
     wrong "get_cells $args"
   }
+  set name [string range [lindex $filter 2] 2 end]
+  if {[dict exists $given -quiet] && $name eq $::finds} { return {} }
   instances [concat $label $inner]
-  return [string range [lindex $filter 2] 2 end]
+  return $name
 }
 proc set_max_delay {args} {
   lassign [options {-datapath_only} {-from -to} $args] given delay
@@ -464,6 +508,32 @@ proc set_false_path {args} {
   lappend ::timing "false_path [dict get $given -to]"
 }
 
+# --- the routed design: UG835, and UG912 for the properties of paths ---------------------------------------------------
+
+proc get_timing_paths {args} {
+  lassign [options {-quiet} {-delay_type -slack_lesser_than -max_paths -from -to} $args] given
+  if {[dict exists $given -from]} {
+    return [expr {$::finds eq "path" ? "path_other" : "path_crossing"}]
+  }
+  if {[dict get $given -delay_type] ni {max min min_max}} { wrong "get_timing_paths $args" }
+  expr {$::finds eq [dict get $given -delay_type] ? "path_late" : {}}
+}
+proc property_of_path {name path} {
+  if {$name ni {SLACK STARTPOINT_PIN ENDPOINT_PIN EXCEPTION}} { wrong "unknown property $name of a path" }
+  dict get [dict create SLACK -0.123 STARTPOINT_PIN from/C ENDPOINT_PIN to/D EXCEPTION [
+    expr {$path eq "path_crossing" ? "MaxDelay Path 5.000ns -datapath_only" : ""}
+  ]] $name
+}
+proc report_bus_skew {args} {
+  lassign [options {-quiet -return_string} {} $args] given
+  if {![dict exists $given -return_string]} { wrong "report_bus_skew $args" }
+  return "Slack ([expr {$::finds eq {skew} ? {VIOLATED} : {MET}}]) :"
+}
+proc report_cdc {args} {
+  lassign [options {-quiet -details} {-file} $args] given
+  lappend ::timing "cdc [dict get $given -file]"
+}
+
 or_leave {
   source [lindex $argv 0]
   foreach name {part top validated} {
@@ -477,6 +547,7 @@ or_leave {
   }
   check_instances
   foreach name $constraints { source $name }
+  source [dict get $project STEPS.ROUTE_DESIGN.TCL.POST]
 }
 dict for {cell fact} $cells { puts "cell $cell [dict get $fact [lindex [dict keys $fact] 0]]" }
 dict for {sink driver} $nets { puts "net $driver $sink [lindex [fact_of $driver] 2]" }

@@ -32,6 +32,8 @@ _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
 _STREAM_FROM_MANAGER = (*_STREAM, "tuser", "tid")
 # Parameters that Vivado infers from whole interface connections and from pins of known polarity.
 _FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
+# The utilities that replace IP cores, which Vivado 2026.1 no longer has.
+_INLINE = {"xlconcat": "ilconcat"}
 # The clock pins of all cells other than the processor.
 _CLOCK_PINS = (
     *(f"dma/{name}_aclk" for name in ("s_axi_lite", "m_axi_sg", "m_axi_mm2s", "m_axi_s2mm")),
@@ -60,6 +62,7 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
                 "cell": cell,
                 "ip": ip,
                 "meaning": meaning,
+                "inline": {"name": _INLINE[ip]} if ip in _INLINE else None,
                 "given": [{"name": name, "cell": cell} for name, _ in properties if name in _FOUND_OUT],
                 "properties": _properties(properties),
             }

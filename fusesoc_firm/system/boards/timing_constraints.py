@@ -10,12 +10,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from fusesoc_firm.system.boards.board import Board
+from fusesoc_firm.system.boards.board import Board, board_entity
 from fusesoc_firm.system.boards.processor import PROCESSORS
 from fusesoc_firm.system.derived.model import Clock, DerivedSystem
 from fusesoc_firm.system.hardware.crossings import Crossing, Scope, all_crossings, port_of, word
 from fusesoc_firm.system.hardware.names import Names, reset_label, resets, synchronised_pins
 from fusesoc_firm.text.render import Context
+
+CHECKS_TEMPLATE = "board/checks.tcl"
 
 
 def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction, separator: str) -> Context:
@@ -36,6 +38,20 @@ def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction, s
         ],
         "resets": [{"instance": reset_label(reset)} for reset in resets(system)],
     }
+
+
+def checks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
+    """Return the configuration of the checks of a routed design in Vivado; `clock` is the frequency of clk in Hz.
+
+    Fields are not among the registers, since an accelerator may use none of them, or have no register for them.
+    """
+    found = clocks_configuration(system, board, clock, "/")
+    paths = [path for crossing in found["crossings"] for path in (*crossing["levels"], *crossing["pointers"])]
+    registers = [path[end] for path in paths for end in ("source", "sink")]
+    registers += [pin["first"] for pin in found["pins"]]
+    registers += [f"{reset['instance']}/first_r" for reset in found["resets"]]
+    common = {"board": board.name, "design": board_entity(system, board), "description": found["description"]}
+    return {**common, "registers": registers, "clocks": found["clocks"]}
 
 
 def _clocks(system: DerivedSystem, board: Board, clock: Fraction) -> list[tuple[str, str, Fraction]]:
