@@ -297,7 +297,7 @@ def test_no_tool_merges_registers_that_constraints_name(entity: str, registers: 
         for attribute, names in re.findall(r"attribute (\w+) of (.*?)\s*: signal is", text)
     }
     # Of Vivado, Quartus (twice) and Synplify with its relatives.
-    assert kept == dict.fromkeys(("dont_touch", "preserve", "dont_merge", "syn_preserve"), {*registers})
+    assert kept == {key: {*registers} for key in ("dont_touch", "preserve", "dont_merge", "syn_preserve")}
 
 
 @pytest.mark.check

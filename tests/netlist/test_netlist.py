@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -192,3 +193,18 @@ def test_a_module_stands_in_for_a_component(tmp_path: Path) -> None:
         'initial #1 $display("%h", q); endmodule'
     )
     assert compile_verilog("bench", [made, inner, bench], tmp_path).run(tmp_path).output == "a5\n"
+
+
+@pytest.mark.skipif(not shutil.which("verilator"), reason="Verilator is not installed")
+def test_a_port_may_have_a_name_of_cpp(tmp_path: Path) -> None:
+    """Verilator warns that it renames such a signal in its program."""
+    source = tmp_path / "top.vhd"
+    source.write_text(
+        "library ieee;\nuse ieee.std_logic_1164.all;\n"
+        "entity top is port (clk, abort : in std_logic; done : out std_logic); end entity;\n"
+        "architecture rtl of top is begin done <= abort when rising_edge(clk); end architecture;\n",
+        encoding="ascii",
+    )
+    made = netlist("top", tmp_path, [source])
+    command = ["verilator", "--cc", "-Wno-lint", "-Wno-style", "--top-module", "top", str(made)]
+    subprocess.run(command, cwd=tmp_path, check=True)
