@@ -169,13 +169,29 @@ begin
       end if;
     end procedure show_beat;
 
+    -- What a reset of the system interrupts never becomes whole.
+    procedure forget_all is
+    begin
+      valid_r  <= '0';
+      whole    := (null, null);
+      is_first := true;
+      for id in frames'range loop
+        frames(id).beats := (null, null);
+        frames(id).bytes := 0;
+      end loop;
+    end procedure forget_all;
+
   begin
-    if rising_edge(clk) and rst_n = '1' then
-      if s_axis_tvalid = '1' and m_axis_tready = '1' then
-        take_beat;
-      end if;
-      if valid_r = '0' or m_axis_tready = '1' then
-        show_beat;
+    if rising_edge(clk) then
+      if rst_n /= '1' then
+        forget_all;
+      else
+        if s_axis_tvalid = '1' and m_axis_tready = '1' then
+          take_beat;
+        end if;
+        if valid_r = '0' or m_axis_tready = '1' then
+          show_beat;
+        end if;
       end if;
     end if;
   end process join;
