@@ -24,7 +24,7 @@ from fusesoc_firm.netlist import dump
 from fusesoc_firm.netlist.corrections import lost_latches
 from fusesoc_firm.netlist.instantiated import Entity, entities
 from fusesoc_firm.netlist.loops import loops
-from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
 from fusesoc_firm.text.outputs import shown
 
 # A process that never waits is only a warning, but its simulation would never end.
@@ -150,6 +150,8 @@ class VhdlReader:
             name = self._known.core_with(found["library"] or found["of"], found["unit"] or "")
             if name:
                 return f"it is in {name}, on which the accelerator's core must depend"
+            if near := closest(found["unit"] or "", self._others):
+                return f"did you mean '{near}'?"
             return f"add the file with '{found['unit']}' to 'sources'" if found["of"] == "work" else ""
         path = Path(source.file)
         return hint(text, lines_of(path), self._formals(path, source))

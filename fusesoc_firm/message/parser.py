@@ -155,8 +155,13 @@ class _Reader:
                 "unexpected blank before '['", name.source, f"write the type as one word: '{joined}'"
             )
             return
+        dialect = self._dialect
+        if default.text and dialect.constant_name.accepts(name.text) and not dialect.field_name.accepts(name.text):
+            hint = f"write '{kind.text} {name.text}={default.text}'"
+            self._diagnostics.error(f"'=' is missing after constant '{name.text}'", default.source, hint)
+            return
         field_type = self._type(kind)
-        is_named = self._check_name(name, self._dialect.field_name)
+        is_named = self._check_name(name, dialect.field_name)
         value = self._default(default, name, field_type) if default.text else None
         is_whole = value is not None or not default.text
         if field_type is not None and is_named and is_whole:

@@ -268,6 +268,11 @@ _PROCESS = "process (clk)\n  begin\n    if rising_edge(clk) then\n      out_data
             f"if in_msg_valid = '1' then\n    {_OUT}\n  else\n    {_OUT}\n  end if;",
             "'if', 'case' and 'loop' are statements in a process",
         ),
+        (
+            _OUT,
+            'process (in_step) begin case in_step(1 downto 0) is when "00" => null; end case; end process;',
+            "add the choice 'when others => ...'",
+        ),
         (_READY, "", "assign it a value: no message passes without it"),
         (_OUT, "u : entity work.img port map (clk => clk, '1');", "connect all by name: 'port => signal'"),
         ("begin\n\n", "begin\n  out_data <= in_step;\n", "and remove the others; see also line "),
@@ -483,13 +488,17 @@ def test_a_float_of_the_wrong_size_in_vhdl() -> None:
 @pytest.mark.parametrize(
     ("part", "hint"),
     [
-        ("generic map (EXPONENT_BIT => 8) port map (clk => clk)", "did you mean 'EXPONENT_BITS'?"),
-        ("port map (clk => clk, x => in_step)", "legal here: clk, rst_n, in_valid, in_ready, in_a, in_b, out_"),
+        ("multiply generic map (EXPONENT_BIT => 8) port map (clk => clk)", "did you mean 'EXPONENT_BITS'?"),
+        (
+            "multiply port map (clk => clk, x => in_step)",
+            "legal here: clk, rst_n, in_valid, in_ready, in_a, in_b, out_",
+        ),
+        ("mutliply port map (clk => clk)", "did you mean 'firm_float_multiply'?"),
     ],
 )
-def test_an_unknown_name_in_the_map_of_an_instance(part: str, hint: str) -> None:
+def test_an_unknown_name_of_an_instance(part: str, hint: str) -> None:
     libraries = Libraries([(path, "firm") for path in core_files("acc/float/float")], is_complete=True)
-    new = f"library firm;\narchitecture rtl of img is\nbegin\n  u : entity firm.firm_float_multiply {part};\n"
+    new = f"library firm;\narchitecture rtl of img is\nbegin\n  u : entity firm.firm_float_{part};\n"
     found = diagnostics("vhdl", "architecture rtl of img is", f"{new}end;\narchitecture other of img is", libraries)
     assert any(item.hint.startswith(hint) for item in found), [str(item) for item in found]
 

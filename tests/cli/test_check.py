@@ -145,6 +145,7 @@ def test_a_fault_in_the_core_ends_every_command_with_its_cure(old: str, new: str
     ("file", "old", "new", "hint"),
     [
         ("tilt.yaml", "project:\n", "project:\n  paths: [msgs]\n", "it is a key of the top level"),
+        ("tilt.core", "depend:\n      - robot:firm:firm_system\n      -", "depend:", "write [robot:acc:firm_float]"),
         ("tilt.yaml", "project:\n", "project:\n  sources: x\n", "it is a key of an item of 'accelerators'"),
         ("tilt.yaml", "  name: tilt", "  name:tilt", "write a blank after the colon: 'name: tilt'"),
         ("tilt.yaml", "rtl/tilt.vhd", "rtl", "it is a folder; its files: tilt.vhd"),

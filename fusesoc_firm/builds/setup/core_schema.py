@@ -64,7 +64,10 @@ def _faults(file: CoreFile, message: str, schema: str) -> Iterator[Diagnostic]:
         wanted = " and ".join(f"'{key}'" for key in _QUOTED.findall(missing["keys"]))
         yield Diagnostic(f"{name} needs the key {wanted}", _place(file, *keys))
     else:
-        yield Diagnostic(f"{name} must {_KINDS.get(found['rule'], found['rule'])}", _place(file, *keys))
+        message = f"{name} must {_KINDS.get(found['rule'], found['rule'])}"
+        item = file.item(*keys) if found["rule"] == "be array" else None
+        hint = f"write [{item[1].value}]" if item and isinstance(item[1].value, str) else ""
+        yield Diagnostic(message, _place(file, *keys), hint)
 
 
 def _place(file: CoreFile, *keys: str) -> SourceRef:

@@ -46,6 +46,7 @@ _ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
 _ERROR = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+):(?P<column>\d+): (?:fatal )?error: (?P<text>.+)", re.MULTILINE)
 # Beginnings of the compiler's errors, each with its cure.
 _CURES = (
+    (r".*: No such file", "put the header beside the source; of the HLS tools' headers, only hls_stream.h is here"),
     (r"cannot convert .* in assignment", "an output is a pointer: write '*name = value;'"),
     (r"invalid conversion from .* to .*\*", "an output is a pointer: write '*name = value;'"),
     (r"expected '[;}]'|expected .* before", "is a ';', a ')' or a '}' missing before this place?"),

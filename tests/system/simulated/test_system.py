@@ -340,6 +340,7 @@ def test_a_fault_in_cpp_is_shown_with_the_prototype(tmp_path: Path, code: str, m
     ("body", "column", "hint"),
     [
         ("    *data_out = 2 * data_inn;", 21, "declare it, correct its name, or include its header"),
+        ('#include "gain.h"', 10, "put the header beside the source"),
         ("    data_out = data_in;", 16, "an output is a pointer: write '*name = value;'"),
         ("    *data_out = data_in", 24, "is a ';', a ')' or a '}' missing before this place?"),
         (
