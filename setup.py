@@ -2,6 +2,7 @@
 
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from setuptools import setup
@@ -11,10 +12,13 @@ README = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
 # An installation contains the pages with pictures and links: `firm path --docs` prints their folder.
 WITHOUT_PICTURES = re.sub(r"^(!\[.*|<!--.*-->)\n", "", README, flags=re.MULTILINE)
 
-# pip shows this line only with --verbose, or if the build fails.
+# pip hides what a build prints, so the line also goes to the terminal, if there is one.
 PAGE = Path(__file__).parent / "fusesoc_firm" / "studio" / "static" / "index.html"
 if "bdist_wheel" in sys.argv and not PAGE.exists():
-    print("warning: this wheel has no page for 'firm studio'; 'make studio' builds the page first", file=sys.stderr)
+    WARNING = "warning: this wheel has no page for 'firm studio'; 'make studio' builds the page first"
+    print(WARNING, file=sys.stderr)
+    with suppress(OSError), Path("/dev/tty").open("w", encoding="utf-8") as terminal:
+        print(f"\n{WARNING}", file=terminal)
 
 setup(
     long_description=re.sub(r"\[([^]]+)\]\((?!\w+:)([^)#]+)[^)]*\)", r"\1 (`\2`)", WITHOUT_PICTURES),
