@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -110,15 +110,17 @@ def _sent(work_root: Path) -> int:
 
 
 def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
-    from fusesoc_firm.runs.simulation.answers import read_answers
+    from fusesoc_firm.runs.simulation.answers import read_answers, software_answers
     from fusesoc_firm.tools.simulators import SIMULATORS
 
     answers: Sequence[Answer] = []
+    software: Mapping[int, Sequence[Answer]] = {}
     if loaded:
         system = loaded.system
         answers = read_answers(chosen.build.work_root, system.subscribers, system.publishers, system.id_bytes)
+        software = software_answers(chosen.build.work_root, system)
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
-    _print_messages(report, answers, shown(chosen.build.log))
+    _print_messages(report, answers, software, shown(chosen.build.log))
     for line in _with_fields(chosen, report.faults, answers, loaded):
         print(coloured(line, is_good=False))
     for line in report.summary:
@@ -142,8 +144,10 @@ def _with_fields(
     return [with_field(line, (sent, expected), topics, system.id_bytes) for line in lines]
 
 
-def _print_messages(report: Report, answers: Sequence[Answer], log: str) -> None:
-    """Print a table of messages: cycles from the first beat in, latency, message and responses.
+def _print_messages(
+    report: Report, answers: Sequence[Answer], software: Mapping[int, Sequence[Answer]], log: str
+) -> None:
+    """Print a table of messages: cycles from the first beat in, latency, message and responses, also of `software`.
 
     The table contains the first messages, and the first ones with a wrong response, which have a mark. The responses
     are those that the model expects; a wrong value is followed by the received one.
@@ -159,7 +163,7 @@ def _print_messages(report: Report, answers: Sequence[Answer], log: str) -> None
         cycles, latency = (
             "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
         )
-        sent, *received = row(item, own, width)
+        sent, *received = row(item, [*own, *software.get(item.number, ())], width)
         number = f"{_WRONG if item.is_wrong else ''}{item.number}"
         line = f"{number:>7}  {cycles:>6}  {latency:>7}  {sent:{width}}  {received[0]}"
         print(coloured(line, is_good=False) if item.is_wrong else line)

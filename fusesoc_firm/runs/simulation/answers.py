@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict, deque
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
@@ -17,8 +17,8 @@ from typing import Any
 
 from fusesoc_firm.frame.codec import CodecError, decode, field_ranges
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.runs.simulation.host_files import differences, leaves, value_text
-from fusesoc_firm.system.derived.model import Converter, Topic
+from fusesoc_firm.runs.simulation.host_files import SOFTWARE_FILE, differences, leaves, value_text
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, Topic
 
 _FILES = ("stimulus.txt", "expected.txt", "received.txt")
 _WRONG_BYTE = re.compile(
@@ -132,12 +132,8 @@ def read_answers(
         return []
     stimuli, expected, received = ([*_frames(path.read_text(encoding="ascii"))] for path in paths)
     id_digits, first = 2 * id_bytes, 2 * (id_bytes + LENGTH_BYTES)
-    sources, sinks = (
-        {item.id.to_bytes(id_bytes, "little").hex(): item for item in items} for items in (subscribers, publishers)
-    )
-    sent = [
-        Payload(topic, digits[first:]) if (topic := sources.get(digits[:id_digits])) else None for _, digits in stimuli
-    ]
+    sinks = {item.id.to_bytes(id_bytes, "little").hex(): item for item in publishers}
+    sent = _sent(stimuli, subscribers, id_bytes)
     waiting: dict[str, deque[tuple[str, str]]] = defaultdict(deque)
     for label, digits in expected:
         waiting[digits[:id_digits]].append((label, digits[first:]))
@@ -150,6 +146,34 @@ def read_answers(
             pair = Payload(topic, wanted), Payload(topic, _masked(digits[first:], wanted))
             answers.append(Answer(name, cause, None if cause is None else sent[cause], *pair))
     return answers
+
+
+def software_answers(folder: Path, system: DerivedSystem) -> dict[int, list[Answer]]:
+    """Return the messages from software to publishers by the number of the message that causes them.
+
+    They are sent without the hardware, so they are received as expected.
+    """
+    paths = [folder / name for name in (_FILES[0], SOFTWARE_FILE)]
+    found: dict[int, list[Answer]] = defaultdict(list)
+    if not system.software.publishers or not all(path.is_file() for path in paths):
+        return found
+    stimuli, published = ([*_frames(path.read_text(encoding="ascii"))] for path in paths)
+    sent = _sent(stimuli, system.subscribers, system.id_bytes)
+    topics = {topic.block: topic for topic in system.software.publishers}
+    for label, digits in published:
+        cause, name = _parts(label)
+        payload = Payload(replace(topics[name], block=f"{name} (software)"), digits)
+        found[cause or 0].append(Answer(name, cause, sent[cause or 0] if sent else None, payload, payload))
+    return found
+
+
+def _sent(stimuli: Iterable[tuple[str, str]], subscribers: Iterable[Converter], id_bytes: int) -> list[Payload | None]:
+    """Return the messages in a file of stimuli; None for one of an unknown subscriber."""
+    topics = {item.id.to_bytes(id_bytes, "little").hex(): item for item in subscribers}
+    first = 2 * (id_bytes + LENGTH_BYTES)
+    return [
+        Payload(item, digits[first:]) if (item := topics.get(digits[: 2 * id_bytes])) else None for _, digits in stimuli
+    ]
 
 
 def _parts(label: str) -> tuple[int | None, str]:

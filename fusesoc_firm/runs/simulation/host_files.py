@@ -14,6 +14,7 @@ from fusesoc_firm.runs.simulation.reference import Response
 from fusesoc_firm.runs.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Converter, Topic
 
+SOFTWARE_FILE = "software.txt"
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
 _AT_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': (?P<what>byte|only|stops after) (?P<byte>\d+)")
@@ -39,6 +40,14 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
         lines.append(f"< {cause}{_label(publisher, response.message)}")
         used = b"\1" * (id_bytes + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
         lines += hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
+    return "\n".join(lines) + "\n"
+
+
+def software_text(published: Iterable[Response]) -> str:
+    """Return the text of the file of payloads from software to publishers, which the host does not read."""
+    lines: list[str] = []
+    for item in published:
+        lines += [f"< @{item.cause or 0} {item.publisher.block}", *hex_lines(item.payload)]
     return "\n".join(lines) + "\n"
 
 

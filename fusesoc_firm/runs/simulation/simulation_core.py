@@ -13,7 +13,7 @@ from fusesoc_firm.converter.converter_core import VHDL
 from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.runs.simulation.environment import environment_files
-from fusesoc_firm.runs.simulation.host_files import expected_text, stimulus_text
+from fusesoc_firm.runs.simulation.host_files import SOFTWARE_FILE, expected_text, software_text, stimulus_text
 from fusesoc_firm.runs.simulation.kernel_library import check_compiles, kernel_files
 from fusesoc_firm.runs.simulation.model_text import check_model
 from fusesoc_firm.runs.simulation.reference import Response, load_model
@@ -94,6 +94,8 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
         "stimulus.txt": _host_file("stimulus.txt", stimulus_text(found.stimuli, system.subscribers, system.id_bytes)),
         "expected.txt": _host_file("expected.txt", expected_text(found.responses, system.publishers, system.id_bytes)),
     }
+    if found.published:
+        files[SOFTWARE_FILE] = _host_file(SOFTWARE_FILE, software_text(found.published))
     return GeneratedCore(f"Simulation of system {system.name}", files)
 
 

@@ -30,10 +30,14 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Traffic:
-    """All messages to the hardware in order, and all messages that it must send, in order for each publisher."""
+    """All messages to the hardware in order, and all messages that it must send, in order for each publisher.
+
+    `published` are the messages from software to publishers, which bypass the hardware.
+    """
 
     stimuli: list[Stimulus] = field(default_factory=list)
     responses: list[Response] = field(default_factory=list)
+    published: list[Response] = field(default_factory=list)
 
 
 def stimulated(system: DerivedSystem) -> list[Topic]:
@@ -82,7 +86,7 @@ def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], re
         run = _Run(system, Functions.of(system.software, folder))
         for number, stimulus in enumerate(stimuli):
             run.take(stimulus, caused.get(number, ()))
-    _check_published(system, run.published, responses)
+    _check_published(system, run.traffic.published, responses)
     return run.traffic
 
 
@@ -105,12 +109,15 @@ def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], response
 
 @dataclass
 class _Run:
-    """The state of a run of software: the hardware's traffic so far, and the messages from software to publishers."""
+    """The state of a run of software: the traffic so far."""
 
     system: DerivedSystem
     functions: Functions
     traffic: Traffic = field(default_factory=Traffic)
-    published: dict[str, list[Message]] = field(default_factory=dict)
+
+    @cached_property
+    def _publishers(self) -> dict[str, Topic]:
+        return {topic.block: topic for topic in self.system.software.publishers}
 
     @cached_property
     def _subscribers(self) -> dict[str, Converter]:
@@ -142,7 +149,11 @@ class _Run:
                 payload = encode_used(subscriber.frame, given)
                 self.traffic.stimuli.append(Stimulus(subscriber, payload, decode(subscriber.frame, payload)))
             else:
-                self.published.setdefault(name, []).append(given)
+                topic = self._publishers[name]
+                payload = encode_used(topic.frame, given)
+                cause = len(self.traffic.stimuli) - 1
+                message = decode(topic.frame, payload)
+                self.traffic.published.append(Response(topic, payload, message, cause if cause >= 0 else None))
 
     def _cause(self, publisher: str) -> int | None:
         """Return the number of the last stimulus so far on the route to a publisher, or None."""
@@ -152,7 +163,7 @@ class _Run:
         return next(numbers, None)
 
 
-def _check_published(system: DerivedSystem, published: dict[str, list[Message]], responses: Sequence[Response]) -> None:
+def _check_published(system: DerivedSystem, published: Sequence[Response], responses: Sequence[Response]) -> None:
     """Raise `InputError` if the messages from software to publishers differ from the model's.
 
     For a publisher without messages of the model, the software's functions are the model.
@@ -161,11 +172,10 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
         wanted = [response for response in responses if response.publisher.block == topic.block]
         if not wanted:
             continue
-        found = published.get(topic.block, [])
-        for number, (message, response) in enumerate(zip(found, wanted, strict=False)):
-            payload = encode_used(topic.frame, message)
-            if payload != response.payload:
-                sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
+        found = [response for response in published if response.publisher.block == topic.block]
+        for number, (own, response) in enumerate(zip(found, wanted, strict=False)):
+            if own.payload != response.payload:
+                sent, said = own.message, decode(topic.frame, response.payload)
                 name, *values = next(differences(sent, said), ("", sent, said))
                 one, other = map(shown, values)
                 what = f"'{name}'" if name else "it"
