@@ -20,6 +20,7 @@ GENERATED = [DOCS / "figures", DOCS / "reference" / "licences.md"]
 FOLLOWED = [
     "tutorials/first-accelerator.md",
     "tutorials/first-filter.md",
+    "tutorials/first-array.md",
     "tutorials/first-accelerator-in-cpp.md",
     "tutorials/first-accelerator-in-python.md",
     "how-to/start-from-a-bag.md",
