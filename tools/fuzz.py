@@ -25,7 +25,10 @@ CAMPAIGNS: Mapping[str, Sequence[str]] = {
     "packets": ("fabric", "wiznet"),
     "messages": ("frame", "message", "middleware", "errors", "text"),
     "bags": ("storage", "runs/bags", "runs/replay"),
+    "resets": ("system/simulated/test_random_resets.py", "system/simulated/test_several_clocks.py"),
 }
+# Campaigns of tests that take minutes each.
+_LONG = ("resets",)
 # Of random netlists in a round.
 DESIGNS = 200
 
@@ -60,8 +63,9 @@ def main() -> int:
 def _command(campaign: str, seed: int) -> list[str]:
     if not (places := CAMPAIGNS[campaign]):
         return [sys.executable, "-m", "tools.fuzz_netlist", "--seed", str(seed), "--designs", str(DESIGNS)]
-    folders = [f"tests/{place}" for place in places]
-    return [sys.executable, "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup", *folders]
+    tests = [f"tests/{place}" for place in places]
+    marks = ["-m", "thorough"] if campaign in _LONG else []
+    return [sys.executable, "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup", *marks, *tests]
 
 
 def _environment(seed: int) -> Mapping[str, str]:

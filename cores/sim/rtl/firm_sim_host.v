@@ -1049,11 +1049,13 @@ module firm_sim_host #(
     $display("seed %0d, stalls %0d %%, %0d bits; to repeat: +SEED=%0d +STALL_PERCENT=%0d", seed, stall_percent, WIDTH,
              seed, stall_percent);
     clk           = 0;
-    rst_n         = 0;
+    rst_n         = 1;
     s_axis_tready = 0;
     offer_nothing;
     repeat (RESET_CYCLES) begin
-      #HALF_PERIOD clk = 1;
+      // An edge clears the registers of the reset, whatever their first level is.
+      #1 rst_n = 0;
+      #(HALF_PERIOD - 1) clk = 1;
       #HALF_PERIOD clk = 0;
       cycle = cycle + 1;
     end

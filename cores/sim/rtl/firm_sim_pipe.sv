@@ -613,11 +613,13 @@ module firm_sim_pipe #(
     report_version;
     reset_state;
     clk           = 0;
-    rst_n         = 0;
+    rst_n         = 1;
     s_axis_tready = 0;
     offer_nothing;
     repeat (RESET_CYCLES) begin
-      #HALF_PERIOD clk = 1;
+      // An edge clears the registers of the reset, whatever their first level is.
+      #1 rst_n = 0;
+      #(HALF_PERIOD - 1) clk = 1;
       #HALF_PERIOD clk = 0;
     end
     request = $fgetc(requests);

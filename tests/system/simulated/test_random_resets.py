@@ -12,11 +12,14 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.clocked_systems import clocked_system
 from tests.hdl.ghdl import CORES, Library
 from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
+from tests.system.simulated.test_resets import SPECIFICATION
+from tests.system.simulated.test_several_clocks import MODEL
 
 SEED = seeded(20261202)
 RTL = CORES / "sim" / "rtl"
@@ -113,6 +116,18 @@ def test_a_system_is_as_new_after_each_reset(number: int, tmp_path: Path) -> Non
 @pytest.mark.parametrize("number", range(40))
 def test_larger_systems_are_as_new_after_each_reset(number: int, tmp_path: Path) -> None:
     resets_pass(number, tmp_path, chains=3, resets=250)
+
+
+def test_a_design_with_another_reset_and_a_clock_enable(tmp_path: Path) -> None:
+    """docs/how-to/adapt-a-design.md"""
+    pins = "    pins: [{name: alive, direction: out}]\n"
+    text = replaced(SPECIFICATION, pins, "").replace("alive", "adapted")
+    sent = [{"sub": {"x": number, "y": -number, "z": 0.5}} for number in range(9)]
+    for name, content in (("spec.yaml", text), ("stimuli.yaml", yaml.safe_dump(sent)), ("model.py", MODEL)):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    system = build(call(*(tmp_path / name for name in ("spec.yaml", "stimuli.yaml", "model.py"))), tmp_path / "system")
+    with_resets(system, 100)
+    assert system.passes(SEED=SEED, STALL_PERCENT=30)
 
 
 def test_a_system_that_is_not_as_new_is_found(tmp_path: Path) -> None:
