@@ -264,9 +264,10 @@ begin
     if rising_edge(clk) then
       if writes = '1' then
         frame(to_integer(place_r)) <= s_axis_tdata;
+      else
+        shown_r <= frame(to_integer(place_r));
       end if;
-      shown_r <= frame(to_integer(place_r));
-      data_r  <= shown_r;
+      data_r <= shown_r;
     end if;
   end process access_frame;
 
