@@ -35,6 +35,11 @@ _LATCH = re.compile(
 _UNEXPECTED = re.compile(
     r"syntax error, unexpected (?P<token>'[^']+'|a name|end of file)(?:, expecting (?P<expected>.+))?"
 )
+# Beginnings of other errors, each with its cure.
+_CURES = {
+    "Mix of positional": "connect all by name: '.port(net)'",
+    "Digit larger than": "the letter names the base: 8'b1010 is binary, 8'd10 decimal, 8'hA hexadecimal",
+}
 _SYSTEM_WORD = re.compile(r"\b(logic|always_ff|always_comb|always_latch|int|bit|byte|typedef|enum|struct|import)\b")
 _COMMENT = re.compile(r"//.*")
 _DIRECTIONS = {"input": "in", "output": "out"}
@@ -162,13 +167,15 @@ def _syntax_fault(text: str, path: Path, line: int) -> tuple[str, SourceRef, str
         return text, place(path, last, 0, lines=lines), "an 'endmodule' or a 'begin' without 'end' is missing above"
     source = place(path, line, 0, lines=lines)
     if not found:
-        return text, source, "connect all by name: '.port(net)'" if text.startswith("Mix of positional") else ""
+        return text, source, next((cure for begin, cure in _CURES.items() if text.startswith(begin)), "")
     code = _COMMENT.sub("", source.text)
     token = found["token"].strip("'")
     if word := re.search(rf"\b{token}\b", code) if token.isalpha() else None:
         source = place(path, line, word.start() + 1, len(token), lines)
     if system := _SYSTEM_WORD.search(code):
         return text, source, f"'{system[1]}' is SystemVerilog, whose files end in .sv: rename {path.name}"
+    if (found["expected"] or "").startswith("','"):
+        return text, source, "is a ',' missing at the end of the line above?"
     if found["expected"] == "';'" or token == "endmodule":
         return text, source, "is a ';' or an 'end' missing above?"
     if token == "<=" and "assign" in code:

@@ -30,7 +30,7 @@ from fusesoc_firm.text.outputs import shown
 # A process that never waits is only a warning, but its simulation would never end.
 _MESSAGE = re.compile(
     r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?:error: ?)? ?(?:warning: (?=infinite loop))?"
-    r"(?!warning|note)(?P<text>.+)"
+    r"(?!warning|note| ?previous declaration)(?P<text>.+)"
 )
 _OPTION = re.compile(r" \[-W[\w-]+\]$")
 # Of GHDL's synthesis; the place is the signal's declaration.

@@ -58,6 +58,7 @@ _HINTS = tuple(
             _GENERATE.pattern,
             "'if', 'case' and 'loop' are statements in a process; outside, write 'a <= b when condition else c;'",
         ),
+        (r"identifier .* already used for a declaration", "rename one of them, or remove it"),
         (r"missing choice|no choices? for", "add the choice 'when others => ...' below the others"),
         (r"positional argument after named", "connect all by name: 'port => signal'"),
         (r"can't associate string literal with generic", "write a number, true or false without quotation marks"),

@@ -133,6 +133,9 @@ class _Reader:
         code, _ = line.partition("#")
         if not code.text:
             return
+        if code.text.startswith("//"):
+            self._diagnostics.error("'//' does not begin a comment", code.source, "a comment begins with '#'")
+            return
         if unsupported := unsupported_form(code):
             feature, part = unsupported
             self._diagnostics.error(feature.fault, part.source, feature.hint)

@@ -44,11 +44,14 @@ _ENVIRONMENT = {**os.environ, "LC_ALL": "C"}
 _WORD = re.compile(r"(?:\\ |\S)+")
 _ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
 _ERROR = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+):(?P<column>\d+): (?:fatal )?error: (?P<text>.+)", re.MULTILINE)
+# If a brace is missing, the error is in our file, and a note in the user's.
+_NOTE = re.compile(r"^(?P<file>[^\s:]+):(?P<line>\d+):(?P<column>\d+): note: (?P<text>to match this .*)", re.MULTILINE)
 # Beginnings of the compiler's errors, each with its cure.
 _CURES = (
     (r".*: No such file", "put the header beside the source; of the HLS tools' headers, only hls_stream.h is here"),
     (r"cannot convert .* in assignment", "an output is a pointer: write '*name = value;'"),
     (r"invalid conversion from .* to .*\*", "an output is a pointer: write '*name = value;'"),
+    (r"to match this", "its counterpart is missing: each '{' needs a '}'"),
     (r"expected '[;}]'|expected .* before", "is a ';', a ')' or a '}' missing before this place?"),
     (
         r".* was not declared in this scope|.* is not a member of 'std'",
@@ -116,14 +119,14 @@ def _report(accelerator: AcceleratorType, folder: Path, output: str) -> NoReturn
     """Raise `InputError` with the compiler's errors, of which the first one of a line causes the others."""
     first = accelerator.accelerator.sources[0]
     faults, lines = Diagnostics(), set()
-    for found in _ERROR.finditer(output):
+    for found in (*_ERROR.finditer(output), *_NOTE.finditer(output)):
         path = folder / found["file"]
         if path.is_file() and (path, found["line"]) not in lines:
             lines.add((path, found["line"]))
             text = path.read_text(encoding="utf-8", errors="replace").splitlines()[int(found["line"]) - 1]
             source = SourceRef(shown(path), int(found["line"]), int(found["column"]), text)
             cure = next((known for pattern, known in _CURES if re.match(pattern, found["text"])), "")
-            faults.error(found["text"], source, cure)
+            faults.error(found["text"].replace("to match", "nothing closes"), source, cure)
     faults.raise_if_any()
     message = f"the C++ of '{accelerator.accelerator.name}' does not compile:\n{output.rstrip()}"
     fail(message, first.source, f"expected: {prototype(accelerator)}")

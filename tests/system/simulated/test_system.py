@@ -357,6 +357,13 @@ def test_a_fault_in_cpp_has_its_own_place_and_cure(tmp_path: Path, body: str, co
     assert text.count("error: ") == 1
 
 
+def test_a_brace_that_is_not_closed_has_its_place(tmp_path: Path) -> None:
+    """The compiler's error is in the generated file that includes the source."""
+    text = kernel_fault(tmp_path, "void twice(int data_in, int *data_out) {\n    *data_out = 2 * data_in;\n")
+    assert text.startswith(f"{tmp_path / 'twice.cpp'}:1:40: error: nothing closes this '{{'\n")
+    assert text.endswith("= its counterpart is missing: each '{' needs a '}'")
+
+
 def test_an_included_file_must_be_a_source(tmp_path: Path) -> None:
     text = kernel_fault(tmp_path, '#include "unlisted.h"\nvoid twice(int data_in, int *data_out) {}\n')
     assert f"'doubled' includes files that are not sources: {tmp_path / 'unlisted.h'}" in text
