@@ -489,7 +489,8 @@ def test_a_float_of_the_wrong_size_in_vhdl() -> None:
     assert "32 bits, but 64 are needed here" in fault.message
     assert fault.source
     assert "in_a => in_step" in fault.source.text
-    assert fault.hint.endswith("EXPONENT_BITS, MANTISSA_BITS of firm_float_multiply")
+    assert "EXPONENT_BITS, MANTISSA_BITS" in fault.hint
+    assert fault.hint.endswith(" of firm_float_multiply")
 
 
 @pytest.mark.parametrize(
