@@ -330,17 +330,21 @@ ENTITIES = {
     "to_fixed": "firm_float_to_fixed",
     "from_fixed": "firm_fixed_to_float",
     "sincos": "firm_float_sincos",
+    "atan2": "firm_float_atan2",
+    "exp": "firm_float_exp",
+    "log": "firm_float_log",
     "low_pass": "firm_float_low_pass",
     "pid": "firm_float_pid",
 }
 OPERANDS = {"multiply": 2, "add": 2, "divide": 2, "compare": 2, "multiply_add": 3, "clamp": 3, "low_pass": 3, "pid": 8}
+OPERANDS["atan2"] = 2
 
 
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("operation", ENTITIES)
 def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_path: Path, operation: str) -> None:
     numbers = Numbers("float32")
-    count = 10 if operation in ("sincos", "low_pass", "pid") else 300
+    count = 10 if operation in ("sincos", "atan2", "exp", "log", "low_pass", "pid") else 300
     rows = random.Random(SEED).sample(numbers.several(2000, OPERANDS.get(operation, 1)), count)
     sizes = size_of(numbers)
     if operation == "sincos":

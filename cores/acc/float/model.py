@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,125 @@ def sine_and_cosine(angle: float) -> tuple[Fraction, Fraction]:
         term = Fraction(round(term * rest / k * 2**160), 2**160)
         sums[k % 2] += term if k % 4 < 2 else -term
     return sums[1], sums[0]
+
+
+def atan2(y: float, x: float, size: Format = FLOAT64) -> float:
+    """Return the angle of the vector (x, y) in rad, as `firm_float_atan2`: within a unit of the last place."""
+    if math.isnan(y) or math.isnan(x):
+        return math.nan
+    is_steep, is_left = abs(x) < abs(y), math.copysign(1.0, x) < 0
+    digits = size.mantissa_bits + 5
+    half_pi = round(PI / 2 * 2**digits)
+    offset = half_pi if is_steep else 2 * half_pi if is_left else 0
+    angle, scale = _flat_angle(*sorted((abs(y), abs(x))), size, adds=offset > 0)
+    units = offset + (angle if is_steep == is_left else -angle)
+    return math.copysign(size.rounded(Fraction(units, 2**digits) * Fraction(2) ** scale), y)
+
+
+def _flat_angle(y: float, x: float, size: Format, *, adds: bool) -> tuple[int, int]:
+    """Return the angle of a vector with 0 <= y <= x: its units, and the exponent of 2**digits units.
+
+    If it is added to another angle, this exponent is 0.
+    """
+    digits = size.mantissa_bits + 5
+    last = digits // 2
+    least = 0 if adds else size.smallest_exponent - 1
+    if math.isinf(y):
+        y = x = 1.0
+    elif not y or math.isinf(x):
+        return 1, least
+    (short, short_exponent), (long, long_exponent) = (_inner(number, size) for number in (y, x))
+    distance = long_exponent - short_exponent
+    scale = max(-distance, least)
+    zeros = min(scale + distance, digits)
+    units = differences = 0
+    for index in range(distance, distance + digits - zeros):
+        sign = 1 if short >= 0 else -1
+        difference = 2 ** (digits + last - index) - _arctangent(index, digits + last) if index <= last else 0
+        tilted = (short if short >= 0 else ~short) >> 2 * index
+        short, long = 2 * (short - sign * long), long + tilted
+        differences += sign * difference
+        units = 2 * units + (short >= 0)
+    return 2 * units + 1 - (differences << (0 if adds else distance) >> last), scale
+
+
+def exp(number: float, size: Format = FLOAT64) -> float:
+    """Return the exponential function of a number, as `firm_float_exp`: within a unit of the last place."""
+    fraction = size.mantissa_bits + 8
+    if math.isnan(number):
+        return math.nan
+    if math.isinf(number) or abs(number) >= 2.0 ** (size.exponent_bits - 1):
+        return math.inf if number > 0 else 0.0
+    magnitude = math.floor(Fraction(abs(number)) * 2**fraction)
+    rest = magnitude if math.copysign(1.0, number) > 0 else ~magnitude
+    rest += _logarithm(0, fraction + size.exponent_bits)
+    power = -(2**size.exponent_bits)
+    for place in range(size.exponent_bits, -1, -1):
+        if rest >= _logarithm(0, fraction + place):
+            rest -= _logarithm(0, fraction + place)
+            power += 2**place
+    factors = []
+    for index in range(1, fraction // 2 + 1):
+        if rest >= _logarithm(index, fraction):
+            rest -= _logarithm(index, fraction)
+            factors.append(index)
+    product = 2**fraction + rest
+    for index in reversed(factors):
+        product += product >> index
+    # A subnormal result is truncated before it is rounded.
+    lowered = max(size.smallest_exponent - power, 0)
+    return size.rounded(Fraction(product >> lowered, 2**fraction) * Fraction(2) ** (power + lowered))
+
+
+def log(number: float, size: Format = FLOAT64) -> float:
+    """Return the natural logarithm, as `firm_float_log`: within a unit of the last place."""
+    if math.isnan(number) or number < 0:
+        return math.nan
+    if not number or math.isinf(number):
+        return math.inf if number else -math.inf
+    mantissa, power = _inner(number, size)
+    unit = 2 ** (size.mantissa_bits + 7)
+    # From 23/16, about the root of 2, the mantissa is halved.
+    is_below = mantissa * 16 >= unit // 4 * 23
+    mantissa, power = (2 * mantissa, power + 1) if is_below else (4 * mantissa, power)
+    if mantissa == unit and not power:
+        return 0.0
+    digits = size.mantissa_bits + 5
+    last = digits // 2
+    product, lack, index = min(mantissa, unit), 2 * abs(mantissa - unit), 1
+    while not power and 2 * lack < unit:
+        lack, index = 2 * lack, index + 1
+    start = index
+    units, differences = _logarithm_of_quotient(product, lack, start, size)
+    twos = abs(power) * _logarithm(0, digits + last + 1)
+    is_opposed = power != 0 and (power < 0) != is_below
+    if is_opposed:
+        differences, units = -differences, -units
+    total = ((twos - (differences << start)) >> last) + units
+    is_negative = power < 0 if power else is_below
+    exact = Fraction(total, 2**digits) * Fraction(1, 2**start)
+    return size.rounded(-exact if is_negative else exact)
+
+
+def _logarithm_of_quotient(product: int, lack: int, start: int, size: Format) -> tuple[int, int]:
+    """Return the digits of ln(1 + lack / 2**start / product), and the differences to be subtracted."""
+    digits = size.mantissa_bits + 5
+    last = digits // 2
+    units = differences = 0
+    is_bent = False
+    for index in range(start, start + digits):
+        if index > last and not is_bent:
+            product += lack >> (index + 1)
+            is_bent = True
+        is_taken = lack >= product
+        if is_taken:
+            lack -= product
+            if index <= last:
+                product += product >> index
+                differences += 2 ** (digits + last - index) - _logarithm(index, digits + last)
+        lack *= 2
+        units = 2 * units + is_taken
+    return 2 * units + 1, differences
 
 
 @dataclass
@@ -149,6 +269,29 @@ def _is_above(number: float, other: float) -> bool:
     if math.isnan(number) or math.isnan(other):
         return not math.isnan(other)
     return _order(number) > _order(other)
+
+
+def _inner(number: float, size: Format) -> tuple[int, int]:
+    """Return mantissa and exponent of a positive number; the mantissa has five bits more."""
+    exponent = _exponent(Fraction(number))
+    return int(Fraction(number) / Fraction(2) ** exponent * 2 ** (size.mantissa_bits + 5)), exponent
+
+
+@cache
+def _arctangent(index: int, fraction: int) -> int:
+    """Return atan(2**-index) in units of 2**-fraction."""
+    if not index:
+        return round(PI / 4 * 2**fraction)
+    terms = (Fraction((-1) ** k, (2 * k + 1) << index * (2 * k + 1)) for k in range(100))
+    return round(sum(terms) * 2**fraction)
+
+
+@cache
+def _logarithm(index: int, fraction: int) -> int:
+    """Return ln(1 + 2**-index) in units of 2**-fraction."""
+    # ln(1 + x) = 2 * artanh(x / (2 + x))
+    ratio = Fraction(1, 2 ** (index + 1) + 1)
+    return round(sum(2 * ratio ** (2 * k + 1) / (2 * k + 1) for k in range(70)) * 2**fraction)
 
 
 def _exponent(magnitude: Fraction) -> int:

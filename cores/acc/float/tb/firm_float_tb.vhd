@@ -46,7 +46,8 @@ architecture test of firm_float_tb is
       return 3*NUMBER;
     elsif OPERATION = "from_fixed" then
       return WIDTH;
-    elsif OPERATION = "square_root" or OPERATION = "resize" or OPERATION = "to_fixed" or OPERATION = "sincos" then
+    elsif OPERATION = "square_root" or OPERATION = "resize" or OPERATION = "to_fixed" or OPERATION = "sincos" or
+          OPERATION = "exp" or OPERATION = "log" then
       return NUMBER;
     end if;
     return 2*NUMBER;
@@ -332,6 +333,67 @@ begin
       );
 
   end generate turns;
+
+  measures_angles : if OPERATION = "atan2" generate
+
+    u_dut : entity firm.firm_float_atan2
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_y       => operands(2*NUMBER-1 downto NUMBER),
+        in_x       => operands(NUMBER-1 downto 0),
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate measures_angles;
+
+  raises : if OPERATION = "exp" generate
+
+    u_dut : entity firm.firm_float_exp
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_number  => operands,
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate raises;
+
+  takes_logarithms : if OPERATION = "log" generate
+
+    u_dut : entity firm.firm_float_log
+      generic map (
+        EXPONENT_BITS => EXPONENT_BITS,
+        MANTISSA_BITS => MANTISSA_BITS
+      )
+      port map (
+        clk        => clk,
+        rst_n      => rst_n,
+        in_valid   => in_valid,
+        in_ready   => in_ready,
+        in_number  => operands,
+        out_valid  => out_valid,
+        out_ready  => out_ready,
+        out_number => result
+      );
+
+  end generate takes_logarithms;
 
   filters : if OPERATION = "low_pass" generate
 
