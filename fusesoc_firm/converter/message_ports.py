@@ -28,7 +28,9 @@ LENGTH_BITS = 32
 
 _TEMPLATES = ("vhdl/variable_subscriber.vhd", "vhdl/variable_publisher.vhd")
 # The templates' configurations add numbers to these names; a numbered name never equals another name.
-_NUMBERED = re.compile(r".*_r|(closing|at_end)_\d+|(elements|(u_)?ahead)_\d+(_[a-z]+)?", re.IGNORECASE)
+_NUMBERED = re.compile(
+    r".*_r|(closing|at_end)_\d+|(elements|(u_)?ahead|(step|next)_fills)_\d+(_[a-z]+)?", re.IGNORECASE
+)
 _TAKEN = reserved_names(*_TEMPLATES) | SET_NAMES | {"payload_length"}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from fusesoc_firm.converter.program import (
     Block,
@@ -128,11 +129,21 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
 SET_NAMES = frozenset(
     f"{kind}_{name}".lower()
     for kind in ("step", "next")
-    for name in ("SETTLES", "IS_BEAT", *(name for name, _, _ in _SETS))
+    for name in ("SETTLES", "IS_BEAT", "HANDS", "TELLS", *(name for name, _, _ in _SETS))
 ) | {"next_aligns_to_2", "next_aligns_to_4"}
 
 
-def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
+@dataclass(frozen=True)
+class StepSet:
+    """A further set, with the steps in it by number, and the register that tells whether the current step is in it."""
+
+    name: str
+    about: str
+    members: frozenset[int]
+    register: str
+
+
+def step_sets(steps: Sequence[Step], lanes: int, further: Sequence[StepSet] = ()) -> list[Context]:
     """The sets as rows of digits, one digit for each step, on a stream with this number of lanes."""
     sets = (
         *_SETS,
@@ -144,6 +155,9 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
         digits = "".join(str(int(is_in(step))) for step in steps)
         if "1" in digits or name == "IS_BEAT":
             found.append({"name": name, "about": about, "rows": digit_rows(digits)})
+    for each in further:
+        digits = "".join(str(int(number in each.members)) for number in range(len(steps)))
+        found.append({"name": each.name, "about": each.about, "rows": digit_rows(digits)})
     return found
 
 
@@ -178,13 +192,17 @@ _REGISTERS = {
 }
 
 
-def step_classes(sets: Sequence[Context]) -> list[Context]:
+def step_classes(sets: Sequence[Context], further: Sequence[StepSet] = ()) -> list[Context]:
     """The sets that a subscriber registers for its current step."""
     names = {found["name"] for found in sets}
-    return [
+    classes = [
         {"set": name, "register": register, "about": about}
         for name, (register, about) in _REGISTERS.items()
         if name in names
+    ]
+    return [
+        *classes,
+        *({"set": each.name, "register": each.register, "about": each.about} for each in further),
     ]
 
 

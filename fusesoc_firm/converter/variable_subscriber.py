@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
+from fusesoc_firm.converter.ahead import HeldTwice, ReadAhead
 from fusesoc_firm.converter.message_ports import (
     ElementPorts,
     MessageSide,
@@ -26,6 +27,7 @@ from fusesoc_firm.converter.program import (
     Open,
     Padding,
     Program,
+    Scope,
     Segment,
     Step,
     Stream,
@@ -54,7 +56,7 @@ from fusesoc_firm.converter.steps import (
 from fusesoc_firm.converter.storing import enables, store_data, stored_slices
 from fusesoc_firm.converter.stream import Store, StoreMap, stores_of
 from fusesoc_firm.converter.stream import Stream as Lanes
-from fusesoc_firm.converter.vhdl import hexadecimal
+from fusesoc_firm.converter.vhdl import bits, hexadecimal, vhdl_type
 from fusesoc_firm.frame.length import longest_payload
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
@@ -64,6 +66,9 @@ VARIABLE_SUBSCRIBER_TEMPLATE = "vhdl/variable_subscriber.vhd"
 
 _LARGEST_NATURAL = 2**31 - 1
 _LARGEST_ALIGNMENT = 8
+_LENGTH_TYPE = "unsigned(31 downto 0)"
+# The bits of a queue's entry below the step.
+_FLAGS = 3
 
 
 class _Window(Lanes):
@@ -136,17 +141,13 @@ class _Subscriber:
             "fields": [field for _, block, named in self._stores for field in self._field_slices(block, named)],
             "streams": (streams := self._streams()),
             "stream_count": len(streams),
-            "is_cut": self.pipeline != NONE,
-            "is_sliced": self.pipeline != NONE and bool(streams),
+            **self._leaving(bool(streams)),
+            "ahead": self._queue(streams) if self.ahead else None,
             "stores_late": self.stores_late,
             "stores": (stores := list(self._stored())),
             "has_windows": any(store["windows"] for store in stores),
             "opened": [found for place, step in enumerate(self.steps) for found in self._opened(place, step)],
-            "completions": [
-                {"step": place, "bit": bit}
-                for place, step in enumerate(self.steps)
-                if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
-            ],
+            "completions": self._completions(),
             # The segment that the header completes.
             "opens_at_once": [
                 {} for step in self.steps if isinstance(step, Header) and self._segment_bit(step.completes)
@@ -161,10 +162,11 @@ class _Subscriber:
         sizes = [fixed_size(step) for step in self.steps]
         last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
+        further = self.ahead.sets if self.ahead else ()
         return {
             "steps": step_list(self.steps),
-            "step_sets": (sets := step_sets(self.steps, self.lanes)),
-            "classes": step_classes(sets),
+            "step_sets": (sets := step_sets(self.steps, self.lanes, further)),
+            "classes": step_classes(sets, further),
             "targets": number_rows([self._target(*choice) for choice in self._choices]),
             "largest_number": max(self.lanes, *last_beats),
             "beat_bits": max(1, max(last_beats).bit_length()),
@@ -252,7 +254,6 @@ class _Subscriber:
             "about": dotted(step.loop.names),
             "step": place,
             "is_joined": self._is_joined(place),
-            "is_used": step.loop.path in self._element_paths,
         }
 
     @cached_property
@@ -301,12 +302,12 @@ class _Subscriber:
     def _part(self, part: FieldPort | StreamPorts | ElementPorts) -> Iterator[Context]:
         """The lengths and elements on the message side, with the numbers of their registers."""
         if isinstance(part, StreamPorts):
-            yield {"name": part.name, "number": self._number(part.part), "has_length": True, "element": None}
+            yield {"name": part.name, "has_length": True, "length": self._length(part.part), "element": None}
         elif isinstance(part, ElementPorts):
             yield {
                 "name": part.name,
-                "number": self._number(part.loop),
                 "has_length": part.loop.count is None,
+                "length": self._length(part.loop),
                 "element": self._element(part) if self._is_closed(part.loop) else None,
             }
 
@@ -318,9 +319,127 @@ class _Subscriber:
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
         used = [(place, part) for place, part in streams if part.is_used]
         return [
-            {"name": self.side.stream(part).name, "step": place, "number": number}
+            {"name": self.side.stream(part).name, "step": place, "number": number, **self._beat(place, number)}
             for number, (place, part) in enumerate(used)
         ]
+
+    def _beat(self, place: int, number: int) -> Context:
+        """The expressions for a beat of the stream of step `place`."""
+        if self.ahead:
+            high, width = self._entry_bits - 2, self.window.width
+            low = high - (0 if self.lanes == 1 else self.lanes)
+            return {
+                "tdata": bits("ahead_word", low, low - width + 1),
+                "tkeep": '"1"' if self.lanes == 1 else bits("ahead_word", high, low + 1),
+                "tvalid": f"ahead_offers and firm.firm_axis_pkg.is_equal({self._queued_step}, {place})",
+                "tlast": f"ahead_word({self._entry_bits - 1})",
+            }
+        return {
+            "tdata": "out_data_r",
+            "tkeep": '"1"' if self.lanes == 1 else "out_keep_r",
+            "tvalid": f"out_valid_r({number})" if self.pipeline == NONE else f"out_busy_r and out_choice_r({number})",
+            "tlast": "out_last_r",
+        }
+
+    def _leaving(self, has_streams: bool) -> Context:
+        """How beats leave, and when the message side has taken everything."""
+        is_sliced = self.pipeline != NONE and has_streams and not self.ahead
+        shown = "(ahead_begun_r or element_shown)" if has_streams else "element_shown"
+        return {
+            "is_sliced": is_sliced,
+            "is_registered": has_streams and not self.ahead and not is_sliced,
+            "is_always_free": bool(self.ahead) or not has_streams,
+            "tells_at_once": not self.ahead and not self.stores_late,
+            "tells_late": not self.ahead and self.stores_late,
+            "message_busy": "ahead_busy" if self.ahead else "out_busy_r",
+            "fault_busy": shown if self.ahead else "out_busy_r",
+        }
+
+    # --- what is read ahead of the message side -----------------------------------------------------------------
+
+    @cached_property
+    def ahead(self) -> ReadAhead | None:
+        """The queue of a message with arrays of messages."""
+        if not self._elements:
+            return None
+        return ReadAhead(self.steps, self.lanes, self._element_paths, self._ends)
+
+    def _queue(self, streams: Sequence[Context]) -> Context:
+        assert self.ahead
+        closes = [(place, step.loop) for place, step in enumerate(self.steps) if isinstance(step, Close)]
+        return {
+            "is_late": self.stores_late,
+            "is_cut": self.pipeline != NONE,
+            "is_byte_wide": self.lanes == 1,
+            "entry_bits": self._entry_bits,
+            "control_bits": self._control_bits,
+            "step_high": self._control_bits - 1,
+            "largest_step": 2 ** (self._control_bits - _FLAGS) - 1,
+            "depth": self.ahead.depth,
+            "has_streams": bool(streams),
+            "streams": streams,
+            "elements": [self._element(ports) for ports in self._elements],
+            "completions": self._completions(),
+            "segments": [self._held_twice(held) for held in self.ahead.segments],
+            "copies": [copy for held in self.ahead.segments for copy in self._copies(held)],
+            "closings": [
+                {
+                    "number": self._number(loop),
+                    "is_used": loop.path in self._element_paths,
+                    "steps": self.ahead.closings(place),
+                }
+                for place, loop in closes
+            ],
+        }
+
+    @property
+    def _control_bits(self) -> int:
+        """The bits of an entry without a beat."""
+        return _FLAGS + (len(self.steps) - 1).bit_length()
+
+    @property
+    def _entry_bits(self) -> int:
+        """The bits of an entry: a beat's data, `tkeep` and `tlast` are above the others."""
+        keep = 0 if self.lanes == 1 else self.lanes
+        return self._control_bits + (self.window.width + keep + 1 if self._has_streams else 0)
+
+    @property
+    def _queued_step(self) -> str:
+        return bits("ahead_word", self._control_bits - 1, _FLAGS)
+
+    @property
+    def _has_streams(self) -> bool:
+        return any(isinstance(step, Stream) and step.part.is_used for step in self.steps)
+
+    def _held_twice(self, held: HeldTwice) -> Context:
+        return {
+            "number": held.number,
+            "about": held.about,
+            "step": held.place,
+            "fills": held.register,
+            "copies": list(self._copies(held)),
+        }
+
+    def _copies(self, held: HeldTwice) -> Iterator[Context]:
+        """The registers of a segment, and those that the ports show."""
+        for _, block, named in self._stores:
+            if block.segment == held.segment:
+                for name, store in named:
+                    yield {"register": name, "shown": f"shown_{name}", "type": vhdl_type(store.bits)}
+        step = self.steps[held.place]
+        if isinstance(step, Open) and is_counted(step) and step.part.is_used:
+            name = f"length_{self._number(step.part)}_r"
+            yield {"register": name, "shown": f"shown_{name}", "type": _LENGTH_TYPE}
+
+    def _length(self, part: Data | Loop) -> str:
+        """The register of a part's length that the port shows."""
+        name = f"length_{self._number(part)}_r"
+        return f"shown_{name}" if self._scopes[type(part), part.path] else name
+
+    @cached_property
+    def _scopes(self) -> dict[tuple[type, Path], Scope]:
+        """The loops around each part."""
+        return {(type(step.part), step.part.path): step.scope for step in self.steps if isinstance(step, Open)}
 
     @cached_property
     def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
@@ -359,7 +478,7 @@ class _Subscriber:
     def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Context]:
         """The slices of ports with their positions in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
-        names = [name for name, _ in named]
+        names = [f"shown_{name}" if block.scope else name for name, _ in named]
         for leaf in block.fields:
             port = replace(self.side.field(leaf), field=leaf)
             for piece in slices_of(port):
@@ -391,6 +510,14 @@ class _Subscriber:
 
     def _number(self, part: Data | Loop) -> int:
         return self._numbers[type(part), part.path]
+
+    def _completions(self) -> list[Context]:
+        """The bits that steps set."""
+        return [
+            {"step": place, "bit": bit}
+            for place, step in enumerate(self.steps)
+            if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
+        ]
 
     def _segment_bit(self, segment: Segment | None) -> str:
         """The bit that signals a segment as valid; "" if no port signals it."""

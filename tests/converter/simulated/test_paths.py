@@ -60,11 +60,13 @@ def test_a_message_that_is_passed_through_makes_no_loop(tmp_path: Path, ros: Mid
 
 @pytest.mark.one_in(4, 3)
 @pytest.mark.parametrize("width", [64, 8])
-@pytest.mark.parametrize("name", ["sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray"])
-def test_with_slices_no_ready_reaches_the_window(tmp_path: Path, name: str, width: int) -> None:
-    """Without them each one does, so the search finds such paths."""
+@pytest.mark.parametrize(
+    ("name", "kind"), [("sensor_msgs/Image", "_tready"), ("diagnostic_msgs/DiagnosticArray", "_ready")]
+)
+def test_with_slices_no_ready_reaches_the_window(tmp_path: Path, name: str, kind: str, width: int) -> None:
+    """Without them each one of a kind does, so the search finds such paths. Beats of elements wait in a queue."""
     frame = ORACLES[ROS2].frame(name)
-    ready = [port.name for port in message_ports(frame, width) if port.is_reverse]
+    ready = [port.name for port in message_ports(frame, width) if port.is_reverse and port.name.endswith(kind)]
     for pipeline, assertion in (NONE, "-assert-any"), (BORDERS, "-assert-none"), (FULL, "-assert-none"):
         netlist = _subscriber(frame, width, tmp_path / pipeline, pipeline)
         reached = [f"select {assertion} i:{port} %co*:-$_DFF_P_ w:u_window.* %i" for port in ready]
