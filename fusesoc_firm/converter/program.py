@@ -74,10 +74,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Padding:
-    """Padding up to a multiple of `alignment`; positions count from the end of the prefix."""
+    """Padding up to a multiple of `alignment`; positions count from the end of the prefix.
+
+    If it `closes_text`, a text's terminating zero precedes the padding, and both take 1 to `alignment` bytes.
+    """
 
     scope: Scope
     alignment: int
+    closes_text: bool = False
 
 
 @dataclass(frozen=True)
@@ -248,8 +252,7 @@ class _Builder:
                 case Fixed():
                     self._fixed(node)
                 case Pad(alignment):
-                    self._flush()
-                    self._append(Padding(self.scope, alignment))
+                    self._pad(alignment)
                 case Data() if node.is_used or not self.is_publisher:
                     self._data(node)
                 case Loop() if node.is_used or not self.is_publisher:
@@ -271,6 +274,13 @@ class _Builder:
                 self.block = replace(self.block, constants=(*self.block.constants, *defaults))
         self.block = replace(self.block, size=start + node.size)
 
+    def _pad(self, alignment: int) -> None:
+        closes_text = self.block == _terminating(self.scope)
+        if closes_text:
+            self.block = Block(self.scope, 0)
+        self._flush()
+        self._append(Padding(self.scope, alignment, closes_text))
+
     def _data(self, node: Data) -> None:
         self._count(node)
         if node.padding != 0:
@@ -283,7 +293,7 @@ class _Builder:
         self._open(node)
         self._append(Stream(self.scope, node), in_segment=False)
         if node.terminator:
-            self.block = _terminating(self.scope, node)
+            self.block = _terminating(self.scope)
 
     def _loop(self, node: Loop) -> None:
         if node.count is None:
@@ -414,12 +424,13 @@ def opens_data(step: Step) -> bool:
 def _terminator(step: Step) -> Iterator[Block]:
     """Yield the step that reads a text's terminating zero, if present, after the text."""
     if isinstance(step, Stream) and step.part.terminator:
-        yield _terminating(step.scope, step.part)
+        yield _terminating(step.scope)
 
 
-def _terminating(scope: Scope, text: Data) -> Block:
-    zeros = ((0, bytes(text.terminator)),)
-    return Block(scope, text.terminator, constants=zeros, checks=zeros)
+def _terminating(scope: Scope) -> Block:
+    """The terminating zero of a text."""
+    zeros = ((0, b"\x00"),)
+    return Block(scope, 1, constants=zeros, checks=zeros)
 
 
 def _is_used(step: Step) -> bool:
@@ -449,8 +460,8 @@ def comment(step: Step) -> str:
             return "the payload's length"
         case Block(fields=fields):
             return ", ".join(dict.fromkeys(dotted(leaf.names) for leaf in fields))
-        case Padding(alignment=alignment):
-            return f"padding to a multiple of {alignment}"
+        case Padding(alignment=alignment, closes_text=closes_text):
+            return f"{'a zero and ' if closes_text else ''}padding to a multiple of {alignment}"
         case Count(part=part) | Guard(part=part) | Open(part=part) | Stream(part=part):
             return dotted(part.names)
         case Close(loop=loop):

@@ -10,7 +10,6 @@ from fusesoc_firm.converter.program import (
     Count,
     Drop,
     End,
-    Guard,
     Header,
     Open,
     Padding,
@@ -74,7 +73,12 @@ def is_text(step: Step) -> bool:
 
 def closes_text(step: Step) -> bool:
     """Whether the first byte of the step is a text's terminating zero."""
-    return isinstance(step, Block) and step.checks == ((0, b"\x00"),)
+    return (isinstance(step, Block) and step.checks == ((0, b"\x00"),)) or closes_with_padding(step)
+
+
+def closes_with_padding(step: Step) -> bool:
+    """Whether the step takes a text's terminating zero and the padding after it."""
+    return isinstance(step, Padding) and step.closes_text
 
 
 def element_size(step: Step) -> int:
@@ -96,9 +100,9 @@ def _takes(step: Step) -> bool:
     return is_fixed(step) or is_stream(step) or isinstance(step, Padding)
 
 
-def _settles(step: Step, lanes: int) -> bool:
-    """Whether the step decides a cycle before it acts; for a count, a single beat must hold the whole count."""
-    return isinstance(step, Tail | End) or (is_count_whole(lanes) and (is_counted(step) or isinstance(step, Guard)))
+def _settles(step: Step) -> bool:
+    """Whether the step decides a cycle before it acts."""
+    return isinstance(step, Tail | End)
 
 
 def _is_text_count(step: Step) -> bool:
@@ -147,7 +151,7 @@ def step_sets(steps: Sequence[Step], lanes: int, further: Sequence[StepSet] = ()
     """The sets as rows of digits, one digit for each step, on a stream with this number of lanes."""
     sets = (
         *_SETS,
-        ("SETTLES", "Decides in its first cycle, and acts in the next one.", lambda step: _settles(step, lanes)),
+        ("SETTLES", "Decides in its first cycle, and acts in the next one.", _settles),
         ("IS_BEAT", "Takes a known number of bytes, in one beat.", lambda step: 0 < fixed_size(step) <= lanes),
     )
     found = []

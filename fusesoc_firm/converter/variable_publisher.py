@@ -408,15 +408,15 @@ class _Publisher:
 
     def _padding_keys(self) -> Context:
         steps = ((area.first, area.step) for area in self.places.areas)
-        found = [(place, _log2(step.alignment)) for place, step in steps if isinstance(step, Padding)]
-        bits = max((own for _, own in found), default=1)
+        found = [(place, _log2(step.alignment), step.closes_text) for place, step in steps if isinstance(step, Padding)]
+        bits = max((own for _, own, _ in found), default=1)
         ahead = ID_BYTES + LENGTH_BYTES + len(self.frame.prefix)
         return {
-            "gaps": _by_place((place, {"bits": own, "zeros": "0" * (bits - own)}) for place, own in found),
-            "in_padding": _at(place for place, _ in found),
+            "gaps": _by_place((place, {"bits": own, "closes_text": closes}) for place, own, closes in found),
+            "in_padding": _at(place for place, _, _ in found),
             "phase_bits": bits,
             "first_phase": binary(-ahead % 2**bits, bits),
-            "gap_fits": self.lanes >= 2**bits - 1,
+            "gap_fits": self.lanes >= max((2**own - (not closes) for _, own, closes in found), default=0),
         }
 
 

@@ -38,6 +38,7 @@ from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.steps import (
     alignment_of,
     closes_text,
+    closes_with_padding,
     digit_rows,
     element_size,
     fixed_size,
@@ -51,12 +52,11 @@ from fusesoc_firm.converter.steps import (
     step_classes,
     step_list,
     step_sets,
-    terminator_of,
 )
 from fusesoc_firm.converter.storing import enables, store_data, stored_slices
 from fusesoc_firm.converter.stream import Store, StoreMap, stores_of
 from fusesoc_firm.converter.stream import Stream as Lanes
-from fusesoc_firm.converter.vhdl import bits, hexadecimal, vhdl_type
+from fusesoc_firm.converter.vhdl import binary, bits, hexadecimal, vhdl_type
 from fusesoc_firm.frame.length import longest_payload
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
@@ -198,10 +198,16 @@ class _Subscriber:
                 if size in sizes
             ],
             "aligned_sets": [
-                {"alignment": alignment, "mask": mask, "rows": digit_rows(self._aligned(alignment))}
+                {
+                    "alignment": alignment,
+                    "size": binary(alignment, 4).strip('"'),
+                    "mask": mask,
+                    "rows": digit_rows(self._aligned(alignment)),
+                }
                 for alignment, mask in ((2, "001"), (4, "011"))
                 if alignment in alignments
             ],
+            "closing_rows": digit_rows(self._closing()) if any(map(closes_with_padding, self.steps)) else [],
             "paddings": [{} for step in self.steps if isinstance(step, Padding)],
         }
 
@@ -210,15 +216,11 @@ class _Subscriber:
         prefix = self.frame.prefix[: self.frame.checked_prefix]
         beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
         has_zeros = any(map(closes_text, self.steps))
-        # A whole count includes the terminating zero; otherwise, the number of elements excludes it.
-        is_whole = is_count_whole(self.lanes)
         counts: list[Context] = [{"bound": None}] if any(map(is_text, self.steps)) else []
         counts += [
             {"bound": {"step": place, "most": most}}
             for place, step in enumerate(self.steps)
-            if isinstance(step, Open)
-            and step.part.bound is not None
-            and (most := step.part.bound + is_whole * terminator_of(step.part)) < _LARGEST_NATURAL
+            if isinstance(step, Open) and step.part.bound is not None and (most := step.part.bound) < _LARGEST_NATURAL
         ]
         return {
             "encoding": [
@@ -264,7 +266,7 @@ class _Subscriber:
     def _target(self, place: int, turns: bool, is_aligned: bool) -> int:
         """The step after a step; `is_aligned` skips the padding there."""
         target = self._successor(place, turns)
-        while is_aligned and isinstance(self.steps[target], Padding):
+        while is_aligned and isinstance(step := self.steps[target], Padding) and not step.closes_text:
             target += 1
         return target
 
@@ -291,6 +293,11 @@ class _Subscriber:
     def _is_joined(self, place: int) -> bool:
         """Whether the element ends with the bytes of the step before its `Close`."""
         return isinstance(self.steps[place - 1], Block | Stream)
+
+    def _closing(self) -> str:
+        """The digits that mark the steps and choices with a transition to padding after a text's zero."""
+        choices = product(range(len(self.steps)), (False, True))
+        return "".join(str(int(closes_with_padding(self.steps[self._successor(*choice)]))) for choice in choices)
 
     def _aligned(self, alignment: int) -> str:
         """The digits that mark the steps and choices with a transition to padding of this alignment."""

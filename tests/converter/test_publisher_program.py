@@ -65,7 +65,8 @@ class Walk:
         match step:
             case Block():
                 self.payload += self.block(step)
-            case Padding(alignment=alignment):
+            case Padding(alignment=alignment, closes_text=closes_text):
+                self.payload += bytes(closes_text)
                 self.payload += bytes(-(len(self.payload) - len(self.program.frame.prefix)) % alignment)
             case Count(part=part):
                 terminator = part.terminator if isinstance(part, Data) else 0
@@ -214,12 +215,12 @@ def test_the_steps_of_an_array_of_messages() -> None:
     program = publisher_program(frame)
     assert [_short(step) for step in program.steps] == [
         *("Header", "Block", "Count e", "Open e"),
-        *("Padding", "Count e.s", "Open e.s", "Stream e.s", "Block"),
+        *("Padding", "Count e.s", "Open e.s", "Stream e.s"),
         *("Padding", "Count e.f", "Guard e.f", "Padding", "Open e.f", "Stream e.f", "Block"),
         *("Close e", "Block", "End"),
     ]
-    assert (program.behind(3), program.behind(6), program.behind_guard(11), program.behind(13)) == (17, 8, 13, 15)
-    assert program.body(16) == 4
+    assert (program.behind(3), program.behind(6), program.behind_guard(10), program.behind(12)) == (16, 8, 12, 14)
+    assert program.body(15) == 4
 
 
 def test_names_do_not_meet_those_of_the_publisher() -> None:
