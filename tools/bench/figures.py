@@ -25,6 +25,7 @@ from tools.bench import (
     manager,
     network,
     nextpnr,
+    passing,
     peers,
     replay,
     resize,
@@ -76,7 +77,12 @@ PAGES = (
         "area and clock of our parts of streams beside those of others",
         ("peers",),
     ),
-    Page("channel-use", "Figures of channel use", "how many cycles of the channel each scheduler uses", ("use",)),
+    Page(
+        "channel-use",
+        "Figures of channel use",
+        "how many cycles of the channel each scheduler and messages with arrays use",
+        ("use", "passing"),
+    ),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
     Page(
         "builds",
@@ -94,6 +100,7 @@ _HEADINGS = {
     "timing": "Timing",
     "peers": "Peers",
     "use": "Channel use",
+    "passing": "Messages with arrays",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
     "loops": "Combinational loops",
@@ -128,6 +135,8 @@ _METHODS = {
         [verilog-axis](https://github.com/alexforencich/verilog-axis) and
         [Open Logic](https://github.com/open-logic/open-logic).""",
     "use": "The beats are counted in the cycle-exact models of the schedulers.",
+    "passing": """The message side of a subscriber is wired to the publisher of the same message. Neither the source of
+        frames nor their sink pauses. GHDL simulates both, and the cycles are counted.""",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
@@ -179,6 +188,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         manager,
         timing,
         use,
+        passing,
         cycles,
         fuzz,
         fuzz_systems,
@@ -239,8 +249,9 @@ def _versions(part: str) -> str:
         return ", ".join([*tools, *simulators.versions()])
     if part == "builds":
         return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
-    if part == "loops":
-        return ", ".join([*map(_first_line, ("ghdl", "yosys", "verilator")), _package("rosbags")])
+    if part in ("loops", "passing"):
+        programs = ("ghdl", "yosys", "verilator") if part == "loops" else ("ghdl",)
+        return ", ".join([*map(_first_line, programs), _package("rosbags")])
     if part == "use":
         return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
