@@ -87,6 +87,11 @@ class Places:
             found.append((place, self._place(self.program.body(number))))
         return tuple(sorted(found))
 
+    def at(self, place: int) -> Area:
+        """The area of a place; the place after all others belongs to the last area."""
+        index = bisect_right([area.first for area in self.areas], place) - 1
+        return self.areas[index]
+
     def areas_of(self, *kinds: type[Step]) -> list[Area]:
         """The areas of the steps of the given kinds."""
         return [area for area in self.areas if isinstance(area.step, kinds)]

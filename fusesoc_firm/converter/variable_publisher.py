@@ -7,7 +7,7 @@ A value that depends on the place is a list in the order of places; each item ap
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -303,8 +303,7 @@ class _Publisher:
 
     def _opening_keys(self) -> Context:
         data = [(area.first, part) for area in self._opens if isinstance(part := _part(area), Data)]
-        jumps = [*self._opening_jumps(), *map(self._closing_jump, self._closings)]
-        never = {area.last for area in self._opens} - {place for place, _ in jumps}
+        jumps = [*self._opening_jumps(), *map(self._closing_jump, self._closings), *self._skips()]
         return {
             "opens_data": _any_place(place for place, _ in data),
             "opens_text": _any_place(place for place, part in data if part.terminator),
@@ -322,29 +321,54 @@ class _Publisher:
                 for shift in sorted({_shift(part) for _, part in data} - {0})
             ],
             "jumps": _gathered(sorted(jumps, key=lambda jump: jump[0]), is_dense=False),
-            "targets": _gathered(
-                (
-                    (place, {"target": binary(target, self.places.end.bit_length())})
-                    for place, target in self.places.jumps
-                    if place not in never
-                ),
-                is_dense=False,
-            ),
+            "targets": _gathered(self._targets({place for place, _ in jumps}), is_dense=False),
         }
+
+    def _targets(self, jumping: Collection[int]) -> Iterator[tuple[int, Context]]:
+        """(place, the target of its jump under a condition); padding without a byte is skipped."""
+        targets = [(place, target) for place, target in self.places.jumps if place in jumping]
+        targets += [(place, place + 2) for place, _ in self._skips()]
+        for place, target in sorted(targets):
+            is_empty = self._is_empty(place, target)
+            yield place, self._target(target, f"not {is_empty}" if is_empty else "")
+            if is_empty:
+                yield place, self._target(target + 1, is_empty)
+
+    def _target(self, place: int, condition: str) -> Context:
+        return {"target": binary(place, self.places.end.bit_length()), "condition": condition}
+
+    def _skips(self) -> Iterator[tuple[int, Context]]:
+        """(place, the jump past padding without a byte), where the place has no other jump."""
+        busy = {place for place, _ in self.places.jumps}
+        for area in self.places.areas:
+            if area.last not in busy and (is_empty := self._is_empty(area.last, area.last + 1)):
+                yield area.last, {"empty_stream": False, "array": None, "is_closing": False, "empty_padding": is_empty}
+
+    def _is_empty(self, place: int, target: int) -> str:
+        """The bit that tells at a place whether the padding at the place `target` is empty.
+
+        "" unless there is padding that may be empty, and the place's size is constant.
+        """
+        area, padding = self.places.at(place), self.places.at(target).step
+        if isinstance(area.step, Stream | Padding) or not isinstance(padding, Padding) or padding.closes_text:
+            return ""
+        size = size_of(area.step) % self.lanes or min(size_of(area.step), self.lanes)
+        phase = f"std_logic_vector(phase_r({_log2(padding.alignment) - 1} downto 0))"
+        return f"is_equal({phase}, {-size % padding.alignment})"
 
     def _opening_jumps(self) -> Iterator[tuple[int, Context]]:
         """(place, the jump past a part without elements); an array of fixed size is never empty."""
         for area in self._opens:
             part = _part(area)
             if isinstance(part, Data):
-                yield area.last, {"empty_stream": True, "array": None, "is_closing": False}
+                yield area.last, {"empty_stream": True, "array": None, "is_closing": False, "empty_padding": ""}
             elif part.count is None:
                 array = self._counter(self._depth_of(part))
-                yield area.last, {"empty_stream": False, "array": array, "is_closing": False}
+                yield area.last, {"empty_stream": False, "array": array, "is_closing": False, "empty_padding": ""}
 
     def _closing_jump(self, closing: tuple[Close, int]) -> tuple[int, Context]:
         """(place, the jump back to the next element)."""
-        return closing[1], {"empty_stream": False, "array": None, "is_closing": True}
+        return closing[1], {"empty_stream": False, "array": None, "is_closing": True, "empty_padding": ""}
 
     # --- loops --------------------------------------------------------------------------------------------------
 
