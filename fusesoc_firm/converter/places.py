@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-from fusesoc_firm.converter.program import Block, Close, Count, Guard, Header, Open, Padding, Program, Step, Stream
-from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Loop
+from fusesoc_firm.converter.program import Block, Close, Count, Header, Open, Padding, Program, Step, Stream
+from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data
 
 # A run of at least this many words of zeros becomes a single place that is sent repeatedly.
 _ROW = 4
@@ -82,7 +82,7 @@ class Places:
     @cached_property
     def jumps(self) -> tuple[tuple[int, int], ...]:
         """(place, target) for each place that may jump, in order."""
-        found = [(area.last, self._place(self._behind(area))) for area in self.areas_of(Open, Guard)]
+        found = [(area.last, self._place(self.program.behind(area.number))) for area in self.areas_of(Open)]
         for (_, place), number in zip(self.closings, self._closing_numbers, strict=True):
             found.append((place, self._place(self.program.body(number))))
         return tuple(sorted(found))
@@ -114,29 +114,17 @@ class Places:
     def _area_numbers(self) -> list[int]:
         return [area.number for area in self.areas]
 
-    def _behind(self, area: Area) -> int:
-        number = self.program.behind_guard(area.number) if isinstance(area.step, Guard) else area.number
-        return self.program.behind(number)
-
     def _moments(self, number: int) -> int:
         """The number of places of a step without words; 0 if another step replaces this step."""
         match self.program.steps[number]:
-            case Guard() | Stream() | Padding():
+            case Stream() | Padding():
                 return 1
             case Open(part=part):
-                # A guard opens the part before its padding. An array without a body has no elements to iterate over.
-                return int(not self._is_guarded(part) and (isinstance(part, Data) or bool(part.body)))
+                # An array without a body has no elements to iterate over.
+                return int(isinstance(part, Data) or bool(part.body))
             case Close():
                 return int(not isinstance(self.program.steps[number - 1], Block))
         return 0
-
-    def _is_guarded(self, part: Data | Loop) -> bool:
-        return id(part) in self._guarded
-
-    @cached_property
-    def _guarded(self) -> frozenset[int]:
-        """The identities of the parts that have a guard."""
-        return frozenset(id(step.part) for step in self.program.steps if isinstance(step, Guard))
 
     def _rows(self, step: Step, place: int) -> Iterator[Row]:
         """The bytes of a step in words; a long run of zeros takes a single word."""

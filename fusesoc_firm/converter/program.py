@@ -6,14 +6,14 @@ steps:
     Header              the payload's length
     Block               bytes of known arrangement
     Padding             padding that depends on the position
-    Count, Guard, Open  a part's number of elements; a skip of an empty part's padding; the beginning of a part
+    Count, Open         a part's number of elements; the beginning of a part, before its padding
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings
     Tail, Drop          the unused rest of the payload: its length, and its bytes
     End                 the end of the message
 
 The index in the list identifies a step. Each step is followed by the next step in the list, with three exceptions whose
-targets `Program` computes: `Guard`, `Open` and `Tail` of an empty part, and `Close`.
+targets `Program` computes: `Open` and `Tail` of an empty part, and `Close`.
 """
 
 from __future__ import annotations
@@ -94,16 +94,11 @@ class Count:
 
 
 @dataclass(frozen=True)
-class Guard:
-    """A jump to `Open` if the part is empty, since no padding precedes an empty part."""
-
-    scope: Scope
-    part: Data | Loop
-
-
-@dataclass(frozen=True)
 class Open:
-    """The beginning of a part with a known number of elements; it skips an empty part and completes a segment."""
+    """The beginning of a part with a known number of elements, before its padding.
+
+    It skips an empty part, which has no padding, and completes a segment.
+    """
 
     scope: Scope
     part: Data | Loop
@@ -141,7 +136,7 @@ class End:
     """The end of the message."""
 
 
-Step = Header | Block | Padding | Count | Guard | Open | Stream | Close | Tail | Drop | End
+Step = Header | Block | Padding | Count | Open | Stream | Close | Tail | Drop | End
 
 
 @dataclass(frozen=True)
@@ -166,18 +161,12 @@ class Program:
         steps = (step for step in self.steps if isinstance(step, Header | Block | Open))
         return Counter(_path(step.completes.scope) for step in steps if step.completes)
 
-    def behind_guard(self, number: int) -> int:
-        """The target of a `Guard` if its part is empty: the part's `Open`."""
-        guard = self.steps[number]
-        assert isinstance(guard, Guard)
-        return self._openings[id(guard.part)]
-
     def behind(self, number: int) -> int:
         """The target of an `Open` if its part is empty."""
         opening = self.steps[number]
         assert isinstance(opening, Open)
         if isinstance(opening.part, Data):
-            return number + 2
+            return _stream_behind(self.steps, number) + 1
         return self._closings.get(id(opening.part), number) + 1
 
     def body(self, number: int) -> int:
@@ -283,14 +272,12 @@ class _Builder:
 
     def _data(self, node: Data) -> None:
         self._count(node)
-        if node.padding != 0:
-            self._append(Guard(self.scope, node))
-            if node.padding is None:
-                self._append(Padding(self.scope, node.alignment))
-            else:
-                self.block = replace(self.block, size=node.padding)
-                self._flush()
         self._open(node)
+        # No segment waits for the padding, which comes before the part.
+        if node.padding is None:
+            self._append(Padding(self.scope, node.alignment), in_segment=False)
+        elif node.padding:
+            self._append(Block(self.scope, node.padding), in_segment=False)
         self._append(Stream(self.scope, node), in_segment=False)
         if node.terminator:
             self.block = _terminating(self.scope)
@@ -407,13 +394,18 @@ def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
     scope: Scope = getattr(steps[last], "scope", ())
     if scope:
         last = closings[scope[0].path]
+    # Opening a stream counts its bytes and a text's terminating zero, so the cut is after them.
+    if opens_data(steps[last]):
+        last = _stream_behind(steps, last)
     rest = steps[last + 1 : -1]
     if not any(isinstance(step, Count | Open) or (isinstance(step, Block) and not step.checks) for step in rest):
         return tuple(steps)
-    # Opening a stream counts its bytes and a text's terminating zero, so the cut is after them.
-    if opens_data(steps[last]):
-        last += 1
     return (*steps[: last + 1], *_terminator(steps[last]), Tail(), Drop(), steps[-1])
+
+
+def _stream_behind(steps: Sequence[Step], opening: int) -> int:
+    """The stream that the step `opening` opens."""
+    return next(place for place in range(opening, len(steps)) if isinstance(steps[place], Stream))
 
 
 def opens_data(step: Step) -> bool:
@@ -462,7 +454,7 @@ def comment(step: Step) -> str:
             return ", ".join(dict.fromkeys(dotted(leaf.names) for leaf in fields))
         case Padding(alignment=alignment, closes_text=closes_text):
             return f"{'a zero and ' if closes_text else ''}padding to a multiple of {alignment}"
-        case Count(part=part) | Guard(part=part) | Open(part=part) | Stream(part=part):
+        case Count(part=part) | Open(part=part) | Stream(part=part):
             return dotted(part.names)
         case Close(loop=loop):
             return dotted(loop.names)

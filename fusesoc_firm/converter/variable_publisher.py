@@ -27,7 +27,6 @@ from fusesoc_firm.converter.program import (
     Block,
     Close,
     Count,
-    Guard,
     Header,
     Open,
     Padding,
@@ -39,7 +38,7 @@ from fusesoc_firm.converter.program import (
 )
 from fusesoc_firm.converter.slices import Slice, slices_of
 from fusesoc_firm.converter.steps import terminator_of
-from fusesoc_firm.converter.vhdl import LINE, any_of, between, binary, bits_of_bool, hexadecimal, within
+from fusesoc_firm.converter.vhdl import LINE, all_of, any_of, between, binary, bits_of_bool, hexadecimal, within
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Context
@@ -299,7 +298,7 @@ class _Publisher:
 
     @property
     def _opens(self) -> list[Area]:
-        return self.places.areas_of(Open, Guard)
+        return self.places.areas_of(Open)
 
     def _opening_keys(self) -> Context:
         data = [(area.first, part) for area in self._opens if isinstance(part := _part(area), Data)]
@@ -326,22 +325,26 @@ class _Publisher:
 
     def _targets(self, jumping: Collection[int]) -> Iterator[tuple[int, Context]]:
         """(place, the target of its jump under a condition); padding without a byte is skipped."""
-        targets = [(place, target) for place, target in self.places.jumps if place in jumping]
-        targets += [(place, place + 2) for place, _ in self._skips()]
-        for place, target in sorted(targets):
+        jumps = [(place, target) for place, target in self.places.jumps if place in jumping]
+        skips = [place for place, _ in self._skips()]
+        busy = {place for place, _ in jumps} & set(skips)
+        found = [(place, target, "left_empty" if place in busy else "") for place, target in jumps]
+        found += [(place, place + 2, "not left_empty" if place in busy else "") for place in skips]
+        for place, target, condition in sorted(found):
             is_empty = self._is_empty(place, target)
-            yield place, self._target(target, f"not {is_empty}" if is_empty else "")
+            yield place, self._target(target, condition, f"not {is_empty}" if is_empty else "")
             if is_empty:
-                yield place, self._target(target + 1, is_empty)
+                yield place, self._target(target + 1, condition, is_empty)
 
-    def _target(self, place: int, condition: str) -> Context:
-        return {"target": binary(place, self.places.end.bit_length()), "condition": condition}
+    def _target(self, place: int, *conditions: str) -> Context:
+        return {"target": binary(place, self.places.end.bit_length()), "condition": all_of(filter(None, conditions))}
 
     def _skips(self) -> Iterator[tuple[int, Context]]:
-        """(place, the jump past padding without a byte), where the place has no other jump."""
+        """(place, the jump past padding without a byte), where the place has no jump, or skips an empty part."""
         busy = {place for place, _ in self.places.jumps}
         for area in self.places.areas:
-            if area.last not in busy and (is_empty := self._is_empty(area.last, area.last + 1)):
+            opens_data = isinstance(area.step, Open) and isinstance(area.step.part, Data)
+            if (opens_data or area.last not in busy) and (is_empty := self._is_empty(area.last, area.last + 1)):
                 yield area.last, {"empty_stream": False, "array": None, "is_closing": False, "empty_padding": is_empty}
 
     def _is_empty(self, place: int, target: int) -> str:
@@ -448,7 +451,7 @@ class _Publisher:
 
 
 def _part(area: Area) -> Data | Loop:
-    assert isinstance(area.step, Count | Open | Guard)
+    assert isinstance(area.step, Count | Open)
     return area.step.part
 
 
@@ -545,7 +548,7 @@ def _about(area: Area) -> str:
             kind = "1 byte:" if size == 1 else f"{size} bytes:"
         case Count():
             kind = "count of"
-        case Guard() | Open():
+        case Open():
             kind = "opens"
         case Stream():
             kind = "stream of"

@@ -22,7 +22,6 @@ from fusesoc_firm.converter.ports import FieldPort
 from fusesoc_firm.converter.program import (
     Block,
     Close,
-    Guard,
     Header,
     Open,
     Padding,
@@ -187,7 +186,7 @@ class _Subscriber:
             "has_stream": any(map(is_stream, self.steps)),
             "has_opens": has_opens,
             "has_left": has_opens or bool(tail),
-            "has_zero": any(isinstance(step, Guard | Tail) or is_counted(step) for step in self.steps),
+            "has_zero": any(isinstance(step, Tail) or is_counted(step) for step in self.steps),
             "tail": tail,
             "opened_bytes": "count_bytes" if has_data else "left_r",
             "has_text": any(map(is_text, self.steps)),
@@ -276,8 +275,6 @@ class _Subscriber:
             close = self._ends[place]
             return close + 1 if turns else self.program.body(close)
         match self.steps[place]:
-            case Guard() if turns:
-                return self.program.behind_guard(place)
             case Open() as step if is_counted(step) and turns:
                 return self.program.behind(place)
             case Tail() if turns:

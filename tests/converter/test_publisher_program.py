@@ -14,7 +14,6 @@ from fusesoc_firm.converter.program import (
     Close,
     Count,
     End,
-    Guard,
     Header,
     Open,
     Padding,
@@ -71,8 +70,6 @@ class Walk:
             case Count(part=part):
                 terminator = part.terminator if isinstance(part, Data) else 0
                 self.payload += (self.count(part) + terminator).to_bytes(4, "little")
-            case Guard(part=part) if not self.count(part):
-                return self.program.behind_guard(place)
             case Open(part=part):
                 return self.open(place, part)
             case Stream(part=part):
@@ -216,11 +213,11 @@ def test_the_steps_of_an_array_of_messages() -> None:
     assert [_short(step) for step in program.steps] == [
         *("Header", "Block", "Count e", "Open e"),
         *("Padding", "Count e.s", "Open e.s", "Stream e.s"),
-        *("Padding", "Count e.f", "Guard e.f", "Padding", "Open e.f", "Stream e.f", "Block"),
+        *("Padding", "Count e.f", "Open e.f", "Padding", "Stream e.f", "Block"),
         *("Close e", "Block", "End"),
     ]
-    assert (program.behind(3), program.behind(6), program.behind_guard(10), program.behind(12)) == (16, 8, 12, 14)
-    assert program.body(15) == 4
+    assert (program.behind(3), program.behind(6), program.behind(10)) == (15, 8, 13)
+    assert program.body(14) == 4
 
 
 def test_names_do_not_meet_those_of_the_publisher() -> None:
