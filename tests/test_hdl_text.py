@@ -43,7 +43,7 @@ REASONS = {
     "converter/constants.py": {"_value": _LITERAL, "_bytes": _LITERAL},
     "converter/payload_length.py": {"_unsigned": _OPERAND},
     "converter/storing.py": {"is_beat": _CONDITION, "_is_used": _CONDITION},
-    "converter/variable_publisher.py": {"_count": _OPERAND},
+    "converter/variable_publisher.py": {"_count": _OPERAND, "_is_empty": _CONDITION},
     "runs/verify/loop.py": dict.fromkeys(("_element_gates", "_message_gate", "_segment_gate", "_gate_of"), _CONDITION),
     "netlist/instantiated.py": {"_range": "the range of a port"},
     "netlist/padding.py": {"text": "a statement on one line, whose length is taken off the columns of messages"},
