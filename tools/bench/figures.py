@@ -80,7 +80,7 @@ PAGES = (
     Page(
         "channel-use",
         "Figures of channel use",
-        "how many cycles of the channel each scheduler and messages with arrays use",
+        "how much of the channel schedulers and messages with arrays use",
         ("use", "passing"),
     ),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
