@@ -18,7 +18,9 @@ from fusesoc_firm.accelerator.vhdl import VhdlReader
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.system.derived.cpp_function import function_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.hardware.compiled import compiled
 from fusesoc_firm.system.system_core import LoadedSystem, artifacts
+from fusesoc_firm.system.written.specification import PYTHON
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics
 from fusesoc_firm.tools.programs import find, ways
 from fusesoc_firm.tools.yosys import Yosys
@@ -49,6 +51,9 @@ def check_accelerators(loaded: LoadedSystem, libraries: Callable[[], Libraries])
             else:
                 names = ", ".join(str(type_.accelerator.name) for type_ in types)
                 faults.warn(f"not read, since {program} is not installed: {names}", hint=ways(program))
+    for type_ in _written_in(PYTHON, loaded):
+        with faults.noting(type_.accelerator.sources[0].source):
+            compiled(type_, loaded.folder)
     for type_ in _written_in("HLS", loaded):
         sources, name = type_.accelerator.sources, function_name(type_)
         if function := read_function(loaded.folder / sources[0], name):

@@ -11,19 +11,19 @@ import sys
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from copy import deepcopy
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fusesoc_firm.accelerator.user_code import UserFunction, load_function
+from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed, with_attributes
+from fusesoc_firm.accelerator.user_code import UserFunction, load_compiled, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_answer
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import used_part
-from fusesoc_firm.system.derived.model import AcceleratorBlock, End, MessageSide, Software
+from fusesoc_firm.system.derived.model import AcceleratorBlock, DerivedSystem, End, MessageSide, Software
 from fusesoc_firm.system.derived.python_function import function_name, parameter_names, prototype
 from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.diagnostics import fail
@@ -154,19 +154,49 @@ class Functions:
         number = self.calls[block.block] = self.calls.get(block.block, -1) + 1
         when = f"message {number} to '{block.block}'"
         function, outputs = self.functions[block.block], block.type.outputs
-        with function.guarded(when, messages):
-            answer: object = function.call(*deepcopy(messages))
+        with function.guarded(when, messages), silent():
+            answer: object = function.call(*_arguments(block, messages))
         answers = [answer] if len(outputs) == 1 else [None] * len(outputs) if answer is None else answer
         if not isinstance(answers, list | tuple) or len(answers) != len(outputs):
             function.fail(f"for {when}, {function.what} returned {answer!r}", _expected(outputs))
+        if block.type.accelerator.is_compiled:
+            answers = [plain(side.frame, value) for side, value in zip(outputs, answers, strict=True)]
         return [_answer(function, when, side, value) for side, value in zip(outputs, answers, strict=True)]
+
+
+def _arguments(block: AcceleratorBlock, messages: Sequence[Message]) -> list[Any]:
+    """Return copies of messages as the block's function takes them."""
+    if not block.type.accelerator.is_compiled:
+        return [with_attributes(message) for message in messages]
+    numbers = str(block.type.accelerator.numbers or "")
+    sides = block.type.inputs
+    return [typed(side.frame, message, numbers) for side, message in zip(sides, messages, strict=True)]
+
+
+def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
+    """Return the model of a system whose accelerators in hardware are all compiled from Python, else None.
+
+    The functions answer for the hardware: the model is called as that of a simulation.
+    """
+    if not system.accelerators or not all(block.type.own.accelerator.is_compiled for block in system.accelerators):
+        return None
+    hardware = Software(blocks=system.accelerators, connections=system.connections)
+    functions = Functions.of(hardware, folder)
+
+    def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
+        return functions.take(End(subscriber), message)
+
+    first = system.accelerators[0].type.own.accelerator.sources[0]
+    return UserFunction(folder / first, "the accelerator", respond)
 
 
 def _load(block: AcceleratorBlock, folder: Path) -> UserFunction:
     name = function_name(block.type)
     path = folder / block.type.accelerator.sources[0]
     parameters = ", ".join(parameter_names(block.type))
-    return load_function(path, name, f"'{name}'", parameters, f"expected: {prototype(block.type)}")
+    hint = f"expected: {prototype(block.type)}"
+    load = load_compiled if block.type.accelerator.is_compiled else load_function
+    return load(path, name, f"'{name}'", parameters, hint)
 
 
 def _answer(function: UserFunction, when: str, side: MessageSide, value: object) -> Message | None:

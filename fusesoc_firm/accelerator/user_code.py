@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NoReturn
 
 from fusesoc_firm.text.diagnostics import SourceRef, closest, fail, nearest
@@ -71,6 +72,23 @@ class UserFunction:
 
 def load_function(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
     """Load the function `name` of a file. May raise `InputError`; `parameters` and `hint` describe the correct form."""
+
+    def run(module: ModuleType) -> None:
+        loader = module.__spec__.loader if module.__spec__ else None
+        assert loader is not None, "the module of a file has a loader"
+        loader.exec_module(module)
+
+    return _loaded(path, name, what, (parameters, hint), run)
+
+
+def load_compiled(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
+    """Load the function of an accelerator that is compiled: it computes with the numbers of hardware."""
+    return _loaded(path, name, what, (parameters, hint), lambda module: _run_compiled(path, module))
+
+
+def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callable[[ModuleType], None]) -> UserFunction:
+    """Return a function of a file; `run` runs the file as a module."""
+    parameters, hint = form
     spec = importlib.util.spec_from_file_location(_MODULE, path.absolute())
     if spec is None or spec.loader is None or not path.is_file():
         fail_missing(path, f"{name}({parameters})", what, hint)
@@ -80,7 +98,7 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     # Write no __pycache__ beside the user's file.
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
-        spec.loader.exec_module(module)
+        run(module)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
         _fail_in(place_in(path, 1), what, error, "")
     finally:
@@ -89,6 +107,17 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     if not callable(function):
         fail(f"{path} has no function '{name}({parameters})'", place_in(path, 1), hint)
     return UserFunction(path, what, function)
+
+
+def _run_compiled(path: Path, module: ModuleType) -> None:
+    """Run a file of a compiled accelerator as a module."""
+    # NumPy is imported only if it is needed.
+    from fusesoc_firm.accelerator.hardware_numbers import adopt, begin, prepared
+
+    begin(module)
+    tree = prepared(ast.parse(path.read_text(encoding="utf-8")))
+    exec(compile(tree, str(path.absolute()), "exec"), vars(module))
+    adopt(module)
 
 
 def fail_missing(path: Path, function: str, what: str, hint: str) -> NoReturn:

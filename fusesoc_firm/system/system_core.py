@@ -54,6 +54,7 @@ from fusesoc_firm.system.derived.ethernet import check_ethernet
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
+from fusesoc_firm.system.hardware.compiled import compiled, compiler_files
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
@@ -89,6 +90,8 @@ _FILE_TYPES = {
 }
 # Parameters of a call that replace keys of the project.
 _REPLACING = ("interconnect", "clock")
+# The languages whose sources are hardware.
+_WRITTEN = ("VHDL", "Verilog")
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 # In Hz. Without register slices, a system that passes through messages of variable size reaches 99 MHz on an ECP5.
 _SLICED_ABOVE = 100 * 10**6
@@ -111,7 +114,9 @@ class LoadedSystem:
 
     def inputs(self) -> list[Input]:
         """Return the accelerators' sources and the definitions of all messages."""
-        return [*source_files(self.specification, self.folder), *self._message_files()]
+        has_compiled = any(item.is_compiled for item in self.specification.accelerators)
+        tables = compiler_files() if has_compiled else []
+        return [*source_files(self.specification, self.folder), *tables, *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
         """Return each message of the converters once, with its definition and all nested definitions."""
@@ -265,6 +270,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for type_ in system.kernels:
         made = wrapper(type_)
         yield Artifact(f"{type_.entity}.vhd", made.template, dict(made.context))
+    for own in dict.fromkeys(item.own for item in system.accelerator_types if item.accelerator.is_compiled):
+        made = compiled(own, loaded.folder)
+        yield Artifact(f"{own.entity}.vhd", made.template, dict(made.context))
     for type_ in system.accelerator_types:
         if type_.inner:
             yield Artifact(f"{type_.entity}.vhd", BYPASS_TEMPLATE, bypass_configuration(type_))
@@ -373,7 +381,7 @@ def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, Genera
     taken: set[Path] = set()
     for type_ in types:
         accelerator = type_.accelerator
-        for source in accelerator.sources if accelerator.type != "HLS" else ():
+        for source in accelerator.sources if accelerator.type in _WRITTEN else ():
             path = (folder / source).resolve()
             if path not in taken:
                 suffix = path.suffix.lower()

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
+from fusesoc_firm.accelerator.functions import compiled_model
+from fusesoc_firm.accelerator.user_code import UserFunction
 from fusesoc_firm.converter.converter_core import VHDL
 from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
@@ -62,7 +64,8 @@ _BENCH_TAGS = ("simulation",)
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
     """Return the files of the system, stimuli, model and environment, and the files that the user's code reads."""
     found = [*live_inputs(request, loaded), *_files(request)]
-    return [*found, *_stimuli_files(_path(request, "stimuli")), _path(request, "model")]
+    model = [_path(request, "model")] if request.parameters["model"] else []
+    return [*found, *_stimuli_files(_path(request, "stimuli")), *model]
 
 
 def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
@@ -76,7 +79,7 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     with faults.noting(request.place("stimuli")):
         stimuli = system_stimuli(_path(request, "stimuli"), loaded)
     with faults.noting(request.place("model")):
-        model = load_model(_path(request, "model"))
+        model = _model(request, loaded)
     faults.raise_if_any()
     found = traffic(system, loaded.folder, stimuli, responses_of(model, stimuli, system))
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
@@ -115,15 +118,22 @@ def check(request: Request, loaded: LoadedSystem, *, may_run: bool) -> None:
             check_compiles(kernel, loaded.folder)
     with faults.noting(request.place("stimuli")):
         stimuli = system_stimuli(_path(request, "stimuli"), loaded, _MOST_CHECKED + 1)
-    path = _path(request, "model")
     with faults.noting(request.place("model")):
-        frames = {topic.block: topic.frame for topic in answered(loaded.system)}
-        check_model(path, frames, published(loaded.system), faults)
+        if request.parameters["model"]:
+            frames = {topic.block: topic.frame for topic in answered(loaded.system)}
+            check_model(_path(request, "model"), frames, published(loaded.system), faults)
     faults.raise_if_any()
     if may_run:
-        found = responses_of(load_model(path), stimuli[:_MOST_CHECKED], loaded.system)
+        found = responses_of(_model(request, loaded), stimuli[:_MOST_CHECKED], loaded.system)
         if len(stimuli) <= _MOST_CHECKED:
             traffic(loaded.system, loaded.folder, stimuli, found)
+
+
+def _model(request: Request, loaded: LoadedSystem) -> UserFunction:
+    """Return the model that the request names, or the functions from which all accelerators are compiled."""
+    if request.parameters["model"]:
+        return load_model(_path(request, "model"))
+    return compiled_model(loaded.system, loaded.folder) or load_model(_path(request, "model"))
 
 
 def _check_possible(request: Request, loaded: LoadedSystem) -> None:

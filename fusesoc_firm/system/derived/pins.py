@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.sides import accelerator_ports
-from fusesoc_firm.system.written.specification import SOFTWARE, Pin
+from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE, Pin
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 
@@ -12,7 +12,7 @@ from fusesoc_firm.text.naming import identifier
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
 # The kinds of ports that are missing in accelerators of some types.
-_WITHOUT_PINS = {"HLS": "ports except for messages", SOFTWARE: "ports"}
+_WITHOUT_PINS = {"HLS": "ports except for messages", PYTHON: "ports except for messages", SOFTWARE: "ports"}
 
 
 def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:

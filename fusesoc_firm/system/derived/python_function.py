@@ -51,7 +51,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
         return
     source = accelerator.sources[0]
-    file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))
+    file = _File(shown_path(source), path.read_text(encoding="utf-8", errors="replace"))
     hint = f"expected: {prototype(type_)}"
     try:
         module = ast.parse(file.text)
@@ -91,7 +91,7 @@ def body_faults(
                 yield node, f"a message has no attribute '{field}'", f'a message is a dict: write {name}["{field}"]'
 
 
-def _shown(source: Text) -> str:
+def shown_path(source: Text) -> str:
     """Return the path of a source, relative to the specification."""
     return str(Path(source.source.file).parent / source) if source.source else str(source)
 

@@ -172,7 +172,7 @@ class _Resolver:
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found.own, self.faults)
-            if accelerator.is_software and accelerator.sources:
+            if (accelerator.is_software or accelerator.is_compiled) and accelerator.sources:
                 check_function(found, sources[0], self.faults)
             check_pins(found, self.faults)
 
@@ -191,6 +191,10 @@ class _Resolver:
         if accelerator.standard is not None and accelerator.type and accelerator.type != "VHDL":
             message = f"'standard' is legal only for VHDL, but '{accelerator.name}' has the type {accelerator.type}"
             self.faults.error(message, accelerator.place("standard"), "remove the key")
+        for key in ("numbers", "resources"):
+            if key in accelerator.places and accelerator.type and not accelerator.is_compiled:
+                message = f"'{key}' is legal only for Python, but '{accelerator.name}' has the type {accelerator.type}"
+                self.faults.error(message, accelerator.place(key), "remove the key")
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""

@@ -21,13 +21,15 @@ from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, parse_yaml, read_yaml
 
-# The type of an accelerator that is a function in software.
+# The type of an accelerator that is a function in software, and of one that is compiled from such a function.
 SOFTWARE = "ROS-SW"
+PYTHON = "Python"
 # The types of accelerators, with the suffixes of their source files.
 SOURCE_SUFFIXES = {
     "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
     "VHDL": (".vhd", ".vhdl"),
     "Verilog": (".v", ".sv", ".vh", ".svh"),
+    PYTHON: (".py",),
     SOFTWARE: (".py",),
 }
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
@@ -71,6 +73,7 @@ PROFILES = {
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+NUMBERS = ("float32", "float64")
 VHDL_93, VHDL_2008 = VHDL_STANDARDS = (93, 2008)
 # Whether the top level has a synchroniser after an input pin, a FIFO after a publisher, or time stamps.
 ADDED, NOT_ADDED = ADDITIONS = ("added", "none")
@@ -294,6 +297,16 @@ class Pin(Section):
 
 
 @dataclass(frozen=True)
+class Resources(Section):
+    """The operators of an accelerator in Python: how many operations of a kind may run at the same time."""
+
+    add: int | None = key("adders (default: 1)", form="integer")
+    multiply: int | None = key("multipliers (default: 1)", form="integer")
+    divide: int | None = key("dividers (default: 1)", form="integer")
+    square_root: int | None = key("square roots (default: 1)", form="integer")
+
+
+@dataclass(frozen=True)
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
@@ -314,11 +327,24 @@ class Accelerator(Section):
         "width in bits of the accelerator's streams (default: the project's width)", form="integer", choices=WIDTHS
     )
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
+    numbers: Text | None = key(
+        "the type of the floating-point numbers of an accelerator in Python (default: the types of the fields)",
+        choices=NUMBERS,
+        is_asked=False,
+    )
+    resources: Resources | None = key(
+        "the operators of an accelerator in Python", form="section", section=Resources, is_asked=False
+    )
 
     @property
     def is_software(self) -> bool:
         """Whether the accelerator runs on the host."""
         return self.type == SOFTWARE
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the accelerator's hardware is compiled from a function in Python."""
+        return self.type == PYTHON
 
     @property
     def vhdl_standard(self) -> int:

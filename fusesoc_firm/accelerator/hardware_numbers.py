@@ -1,0 +1,218 @@
+"""Run a Python function with the numbers of hardware, so that the function is the model of its compiled accelerator.
+
+Fields are NumPy's numbers of the message's types. Where Python, `math` or NumPy would raise an exception, or compute a
+number that hardware does not compute, a function of this module takes the place: powers are products, the square root
+of a negative number is NaN, and a conversion of NaN to an integer is 0.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
+from fusesoc_firm.message.wire import WireType
+
+_POWER = "_firm_power"
+_LEAST, _MOST = -(1 << 63), (1 << 63) - 1
+
+
+class Message(dict[str, Any]):
+    """A message as a dictionary whose fields are also attributes."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(f"the message has no field '{name}'", name=name, obj=self) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self[name] = value
+
+
+def with_attributes(value: Any) -> Any:
+    """Return a copy of a message in which the fields are also attributes, at all levels."""
+    if isinstance(value, Mapping):
+        return Message({name: with_attributes(item) for name, item in value.items()})
+    return [with_attributes(item) for item in value] if isinstance(value, list) else value
+
+
+def typed(frame: Frame, message: Mapping[str, Any], numbers: str = "") -> Message:
+    """Return a message with numbers of NumPy; floats have the type `numbers`, if it is given."""
+    types = {_names(part): _type(part, numbers) for part in _numbers(frame)}
+    made: Message = _typed(message, (), types)
+    return made
+
+
+def _numbers(frame: Frame) -> Iterator[FrameField | Data]:
+    for node in all_nodes(frame.nodes):
+        if isinstance(node, Fixed):
+            yield from node.fields
+        elif isinstance(node, Data) and node.kind is DataKind.ARRAY:
+            yield node
+
+
+def _names(part: FrameField | Data) -> tuple[str, ...]:
+    return part.names
+
+
+def _type(part: FrameField | Data, numbers: str) -> Callable[[Any], Any]:
+    wire: WireType = part.element if isinstance(part, Data) else part.type
+    if wire.name == "bool":
+        # An array of variable size has bytes.
+        return np.uint8 if isinstance(part, Data) else bool
+    name = numbers if numbers and wire.name.startswith("float") else wire.name
+    made: Callable[[Any], Any] = getattr(np, name)
+    return made
+
+
+def _typed(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], Callable[[Any], Any]]) -> Any:
+    if isinstance(value, Mapping):
+        return Message({name: _typed(item, (*path, name), types) for name, item in value.items()})
+    if isinstance(value, list | bytes | bytearray):
+        return [_typed(item, path, types) for item in value]
+    return types[path](value) if path in types and not isinstance(value, str) else value
+
+
+def plain(frame: Frame, answer: Any) -> Any:
+    """Return an answer with Python's numbers: integers wrap in their field, and each NaN is the positive quiet NaN."""
+    bits = {_names(part): (part.element if isinstance(part, Data) else part.type) for part in _numbers(frame)}
+    return _plain(answer, (), bits)
+
+
+def _plain(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], WireType]) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(item, (*path, str(name)), types) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, path, types) for item in value]
+    wire = types.get(path)
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        return math.nan if math.isnan(number) else number
+    if isinstance(value, bool | np.bool_):
+        return bool(value) if wire is None or wire.name == "bool" else int(value)
+    if isinstance(value, int | np.integer) and wire is not None and wire.code in "bBhHiIqQ":
+        whole = int(value) % (1 << wire.bits)
+        return whole - (1 << wire.bits) if wire.code.islower() and whole >> (wire.bits - 1) else whole
+    return value
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Let NumPy compute infinities, NaN and integers that wrap without a warning."""
+    with np.errstate(all="ignore"):
+        yield
+
+
+def prepared(module: ast.Module) -> ast.Module:
+    """Return a source in which powers are calls of `power`."""
+    made: ast.Module = ast.fix_missing_locations(_Powers().visit(module))
+    return made
+
+
+class _Powers(ast.NodeTransformer):
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Pow):
+            return node
+        call = ast.Call(ast.Name(_POWER, ast.Load()), [node.left, node.right], [])
+        return ast.copy_location(call, node)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Pow) or not isinstance(node.target, ast.Name):
+            return node
+        before = ast.Name(node.target.id, ast.Load())
+        call = ast.Call(ast.Name(_POWER, ast.Load()), [before, node.value], [])
+        return ast.copy_location(ast.Assign([node.target], call), node)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """Return a power as hardware computes it: products from the left, the square root, or the inverse of a power."""
+    if exponent == 0.5:
+        return square_root(base)
+    if exponent != int(exponent):
+        return base**exponent
+    if exponent < 0:
+        return (
+            np.divide(1.0, power(base, -int(exponent)))
+            if isinstance(base, np.generic)
+            else 1.0 / power(base, -exponent)
+        )
+    result = base * 1 if isinstance(exponent, int) else base * 1.0
+    first = result
+    for _ in range(int(exponent) - 1):
+        result = result * first
+    return result if exponent else first * 0 + 1
+
+
+def square_root(value: Any) -> Any:
+    """Return the square root in the value's type: float32, or float64."""
+    return _real(np.sqrt, value)
+
+
+def _real(function: Callable[..., Any], *values: Any) -> Any:
+    """Return the result of a function of NumPy in the type that `math` would have for float64, or in float32."""
+    if all(isinstance(value, np.float32) for value in values):
+        return function(*values)
+    made = function(*(np.float64(value) for value in values))
+    return made if any(isinstance(value, np.float64) for value in values) else made.item()
+
+
+def _whole(value: Any, rounding: Callable[[Any], int]) -> int:
+    """Return a number as an integer of 64 bits: the nearest one, and 0 for NaN."""
+    if isinstance(value, float | np.floating) and not math.isfinite(value):
+        return 0 if math.isnan(value) else _MOST if value > 0 else _LEAST
+    return min(max(rounding(value), _LEAST), _MOST)
+
+
+def _floor(value: Any) -> int:
+    whole = _whole(value, math.trunc)
+    return whole - bool(value < whole)
+
+
+def _hypotenuse(*values: Any) -> Any:
+    squares = [_real(np.multiply, value, value) for value in values]
+    total = squares[0]
+    for item in squares[1:]:
+        total = total + item
+    return square_root(total)
+
+
+_MATH: Mapping[str, Callable[..., Any]] = {
+    "sqrt": square_root,
+    "fabs": lambda value: _real(np.fabs, value),
+    "copysign": lambda value, sign: _real(np.copysign, value, sign),
+    "floor": _floor,
+    "ceil": lambda value: -_floor(-value),
+    "trunc": lambda value: _whole(value, math.trunc),
+    "hypot": _hypotenuse,
+}
+_BUILTINS: Mapping[str, Callable[..., Any]] = {
+    "int": lambda value=0: _whole(value, int) if isinstance(value, float | np.floating) else int(value),
+    "round": lambda value: _whole(value, round) if isinstance(value, float | np.floating) else value,
+}
+
+
+def adopt(module: ModuleType) -> None:
+    """Give a module the functions of hardware in place of those of Python and `math`."""
+    own = SimpleNamespace(**{**vars(math), **_MATH})
+    replaced = {id(getattr(math, name)): function for name, function in _MATH.items()}
+    for name, value in [*vars(module).items()]:
+        if value is math:
+            setattr(module, name, own)
+        elif id(value) in replaced:
+            setattr(module, name, replaced[id(value)])
+    for name, function in _BUILTINS.items():
+        vars(module).setdefault(name, function)
+
+
+def begin(module: ModuleType) -> None:
+    """Give a module, before it runs, the function that takes the place of `**`."""
+    setattr(module, _POWER, power)

@@ -1,0 +1,1 @@
+"""Compile a Python function to hardware: front, graph, schedule, binding, text."""

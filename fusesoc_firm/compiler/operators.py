@@ -1,0 +1,113 @@
+"""The operators of `robot:acc:firm_float`, as the file `operators.yaml` of this core describes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.compiler.graph import Node
+from fusesoc_firm.compiler.kinds import Kind
+from fusesoc_firm.tools.library_path import library_root
+
+# The operations of the graph that are operators, each with the operator's name.
+_NAMES = {
+    "add": "add",
+    "multiply": "multiply",
+    "divide": "divide",
+    "square_root": "square_root",
+    "to_float": "from_fixed",
+    "to_integer": "to_fixed",
+    "resize": "resize",
+}
+# The widths of integers that are converted; one operator converts all that are not wider.
+_WIDTHS = (32, 64, 65)
+
+
+@dataclass(frozen=True)
+class Operator:
+    """An entity that computes one operation: the generics, the ports of the operands, and the port of the result.
+
+    The result is there `latency` cycles after its operands, or later if `has_wait` is set; `width` is its bits, and
+    `operand` those of its operands.
+    """
+
+    operation: str
+    entity: str
+    generics: tuple[tuple[str, str], ...]
+    inputs: tuple[str, ...]
+    output: str
+    latency: int
+    has_wait: bool
+    width: int
+    operand: int
+    lut: int
+    ff: int
+    dsp: int
+
+
+def table_file() -> Path:
+    """Return the path of the description of all operators."""
+    return library_root() / "cores" / "acc" / "float" / "operators.yaml"
+
+
+@cache
+def _table() -> Mapping[str, Any]:
+    found: Mapping[str, Any] = yaml.safe_load(table_file().read_text(encoding="utf-8"))["operators"]
+    return found
+
+
+def is_operator(node: Node) -> bool:
+    """Whether an operator computes the node, which other nodes may share."""
+    if node.operation in ("add", "multiply", "divide"):
+        return node.kind.is_float
+    return node.operation in _NAMES
+
+
+def operator_of(node: Node, form: str = "default") -> Operator:
+    """Return the operator that computes a node; `form` is preferred, if the operator has it."""
+    of_operand = node.operation in ("to_integer", "resize")
+    size = node.operands[0].kind if of_operand else node.kind
+    description = _table()[_NAMES[node.operation]]
+    forms = description["forms"]
+    facts = forms.get(form, forms["default"])[_size(size)]
+    width, generics = _conversion(node)
+    latency = facts["latency"]
+    if not isinstance(latency, int):
+        latency = next(cycles for most, cycles in latency.items() if width <= most)
+    ports = tuple(name for name, type_ in description["inputs"].items() if type_ != "bit")
+    return Operator(
+        node.operation,
+        description["entity"],
+        (*((name, str(value)) for name, value in facts["generics"].items()), *generics),
+        ports,
+        next(iter(description["outputs"])),
+        latency,
+        "longest" in facts,
+        width if node.operation == "to_integer" else node.kind.bits,
+        width if node.operation == "to_float" else size.bits,
+        facts["lut"],
+        facts["ff"],
+        facts["dsp"],
+    )
+
+
+def _size(kind: Kind) -> str:
+    return "float32" if kind.bits == 32 else "float64"
+
+
+def _conversion(node: Node) -> tuple[int, tuple[tuple[str, str], ...]]:
+    """Return the width of a converted integer, and the generics that set it."""
+    if node.operation == "to_float":
+        value = node.operands[0]
+        needed = value.bits + (not value.is_signed)
+        width = next(item for item in _WIDTHS if needed <= item)
+        return width, (("WIDTH", str(width)), ("FRACTION", "0"))
+    if node.operation == "to_integer":
+        truncates = "true" if node.payload == "truncate" else "false"
+        return node.bits, (("WIDTH", str(node.bits)), ("FRACTION", "0"), ("TRUNCATES", truncates))
+    return node.kind.bits, ()

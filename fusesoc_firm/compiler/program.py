@@ -1,0 +1,406 @@
+"""Compile a Python function to a program: a graph, its loops over streams, its states and its answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+from fusesoc_firm.compiler.front import Interpreter
+from fusesoc_firm.compiler.graph import Graph, Node
+from fusesoc_firm.compiler.interface import Part, Side, message_value, places
+from fusesoc_firm.compiler.kinds import Kind, number_of
+from fusesoc_firm.compiler.paths import Carried, Loop
+from fusesoc_firm.compiler.source import Source
+from fusesoc_firm.compiler.values import (
+    Array,
+    Class,
+    Function,
+    Instance,
+    Maybe,
+    Named,
+    Produced,
+    Record,
+    Stream,
+    Unbound,
+    UnmergeableError,
+    Value,
+    common_kind,
+    converted,
+    described,
+)
+from fusesoc_firm.frame.model import names_of
+from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.text.diagnostics import nearest
+
+_MOST_ROUNDS = 20
+
+
+@dataclass
+class State:
+    """A value that the function keeps between messages: its path, its first value, and its next one."""
+
+    path: str
+    first: Node
+    value: Node
+    next: Node
+
+
+@dataclass
+class Sent:
+    """A string or an array of an answer: passed on from an input, produced by a loop, or empty."""
+
+    part: Part
+    value: Stream | Produced | None
+
+
+@dataclass
+class Answer:
+    """A message that the function returns: the condition to send it, its fields by port, and its parts."""
+
+    side: Side
+    condition: Node
+    fields: dict[str, list[Node]] = field(default_factory=dict)
+    parts: list[Sent] = field(default_factory=list)
+
+
+@dataclass
+class Program:
+    """A compiled function."""
+
+    name: str
+    source: Source
+    graph: Graph
+    inputs: Sequence[Side]
+    loops: list[Loop]
+    states: list[State]
+    answers: list[Answer]
+
+    def results(self) -> Iterator[Node]:
+        """Yield all nodes whose values the hardware needs."""
+        for state in self.states:
+            yield state.next
+        for loop in self.loops:
+            for item in loop.carried.values():
+                yield item.first
+                if item.next is not None:
+                    yield item.next
+            yield from loop.appended.values()
+        for answer in self.answers:
+            yield answer.condition
+            for values in answer.fields.values():
+                yield from values
+
+    def needed(self) -> list[Node]:
+        """Return the nodes that results depend on, in their order."""
+        found = self._reached([*self.results()])
+        return [item for item in self.graph.nodes if item.number in found]
+
+    def drop_unused(self) -> None:
+        """Remove the carried values of loops on which no result depends, such as an index that nobody reads."""
+        used = {id(item) for loop in self.loops for item in loop.carried.values()}
+        while True:
+            read = self._reached([*self.results()])
+            kept = {
+                id(item) for loop in self.loops for item in loop.carried.values() if self._is_read(loop, item, read)
+            }
+            if kept == used:
+                return
+            used = kept
+            for loop in self.loops:
+                loop.carried = {key: item for key, item in loop.carried.items() if id(item) in kept}
+
+    def _is_read(self, loop: Loop, item: Carried, read: set[int]) -> bool:
+        """Whether other values than its own next one depend on a carried value."""
+        leaves = {item.value.number}
+        leaves |= {
+            node.number
+            for node in self.graph.nodes
+            if node.operation == "final" and node.payload == (loop.number, item.value.payload)
+        }
+        others = [node for node in self.results() if node is not item.next]
+        return bool(leaves & self._reached(others)) if leaves & read else False
+
+    def _reached(self, results: Sequence[Node]) -> set[int]:
+        """Return the numbers of all nodes that results depend on."""
+        found: set[int] = set()
+        waiting = [*results]
+        while waiting:
+            item = waiting.pop()
+            if item.number not in found:
+                found.add(item.number)
+                waiting += item.operands
+        return found
+
+
+@dataclass(frozen=True)
+class Task:
+    """A function to compile: its source and name, its messages, and the kind of its floats, if one is given."""
+
+    source: Source
+    name: str
+    inputs: Sequence[Side]
+    outputs: Sequence[Side]
+    numbers: Kind | None = None
+
+
+def compile_function(task: Task) -> Program:
+    """Return the program of a function, or of a callable object, of a source. May raise `InputError`.
+
+    The function is run until the kinds of its states are known.
+    """
+    states: dict[str, tuple[Kind, int, int]] = {}
+    for _ in range(_MOST_ROUNDS):
+        run = _Run(task, states)
+        wider = run.changes()
+        if not wider:
+            return run.program()
+        states |= wider
+    source = task.source
+    return source.refuse(source.module, "the types of the states cannot be determined", "give them a type of NumPy")
+
+
+class _Run:
+    """One run of the function with states of given kinds."""
+
+    def __init__(self, task: Task, states: dict[str, tuple[Kind, int, int]]) -> None:
+        self.name, self.inputs, self.outputs, self.states = task.name, task.inputs, task.outputs, states
+        self.interpreter = Interpreter(task.source, on_global=self._enter)
+        self.graph = self.interpreter.graph
+        self.first: dict[str, Value] = {}
+        self.next: dict[str, Node] = {}
+        self.leaves: dict[str, Node] = {}
+        function = self._function()
+        memory = self.interpreter.memory
+        messages = [message_value(side, self.graph, memory, task.numbers) for side in task.inputs]
+        self.node = function.definition
+        self.result = self.interpreter.call(function, messages, {}, self.node)
+
+    def _function(self) -> Function:
+        """Return the function, or the method that is called for an object."""
+        source, run = self.interpreter.source, self.interpreter
+        if self.name not in run.definitions:
+            source.refuse(
+                source.module, f"the file has no function '{self.name}'", nearest(self.name, [*run.definitions])
+            )
+        value = run.global_value(self.name, run.definitions[self.name])
+        if isinstance(value, Instance):
+            method = next((item for item in value.type.body if getattr(item, "name", "") == "__call__"), None)
+            if method is None:
+                source.refuse(
+                    value.type, f"'{value.type.name}' has no method '__call__'", "the message is its argument"
+                )
+            value = run.member(value, "__call__", value.type)
+        match value:
+            case Function():
+                return value
+            case Class(definition=definition):
+                hint = f"construct it: {self.name} = {definition.name}()"
+                source.refuse(definition, f"'{self.name}' is a class, not an object", hint)
+            case Named():
+                source.refuse(
+                    run.definitions[self.name], f"'{self.name}' is not defined in this file", "define it here"
+                )
+        return source.refuse(run.definitions[self.name], f"'{self.name}' is {described(value)}, not a function")
+
+    def _enter(self, name: str) -> None:
+        """Note the first values of the objects that a name of the module has, and put states in their place."""
+        for path, owner, key, value in self._cells(name):
+            self.first[path] = value
+            if path in self.states:
+                kind, *limits = self.states[path]
+                leaf = self.graph.leaf("state", kind, path, (limits[0], limits[1]))
+                self.leaves[path] = leaf
+                self.interpreter.memory.cells[owner][key] = leaf
+
+    def _cells(self, name: str) -> Iterator[tuple[str, Any, Any, Value]]:
+        """Yield the path, the owner, the key and the value of each number to which a name leads."""
+        yield from self._below(name, self.interpreter.module_names[name], set())
+
+    def _below(self, path: str, owner: Value, seen: set[int]) -> Iterator[tuple[str, Any, Any, Value]]:
+        if not isinstance(owner, Instance | Array | Record) or id(owner) in seen:
+            return
+        seen.add(id(owner))
+        for key, value in [*self.interpreter.memory.cells[owner].items()]:
+            below = f"{path}[{key}]" if isinstance(key, int) else f"{path}.{key}"
+            if isinstance(value, Instance | Array | Record):
+                yield from self._below(below, value, seen)
+            else:
+                yield below, owner, key, value
+
+    def changes(self) -> dict[str, tuple[Kind, int, int]]:
+        """Return the states that the function changes beyond expectation, with their kinds and limits."""
+        found: dict[str, tuple[Kind, int, int]] = {}
+        after = {path: value for name in self.interpreter.module_names for path, _, _, value in self._cells(name)}
+        for path in self.first.keys() - after.keys():
+            self._refuse(f"'{path}' is lost with a message", "keep the number of elements of lists")
+        for path, value in after.items():
+            if path not in self.first:
+                self._refuse(f"'{path}' grows with each message", "use a list of fixed size, and replace its elements")
+            before = self.leaves.get(path, self.first[path])
+            if value is before:
+                if path in self.leaves:
+                    self.next[path] = self.leaves[path]
+                continue
+            if not isinstance(value, Node) or not isinstance(self.first[path], Node):
+                what = f"was {described(self.first[path])}, and becomes {described(value)}"
+                self._refuse(f"'{path}' {what}", "a state is a number")
+            wanted = self._widened(path, self.first[path], value)
+            if wanted != self.states.get(path):
+                found[path] = wanted
+            else:
+                self.next[path] = converted(self.graph, value, wanted[0])
+        return found
+
+    def _widened(self, path: str, first: Node, value: Node) -> tuple[Kind, int, int]:
+        try:
+            kind = common_kind(first.kind, value.kind)
+        except UnmergeableError as error:
+            self._refuse(f"'{path}' is {error}", "give it one type")
+        if kind.is_float:
+            return kind, 0, 0
+        low, high = min(first.low, value.low), max(first.high, value.high)
+        if path in self.states and (low, high) != self.states[path][1:]:
+            low, high = kind.limits
+        return kind, low, high
+
+    def _refuse(self, message: str, hint: str = "") -> NoReturn:
+        self.interpreter.refuse(self.node, message, hint)
+
+    def program(self) -> Program:
+        """Return the program of this run."""
+        states = [
+            State(
+                path,
+                self.graph.constant(number_of(self.states[path][0], self.first[path].payload)),
+                leaf,
+                self.next[path],
+            )
+            for path, leaf in self.leaves.items()
+        ]
+        program = Program(
+            self.name,
+            self.interpreter.source,
+            self.graph,
+            self.inputs,
+            sorted(self.interpreter.loops, key=lambda loop: loop.number),
+            states,
+            self._answers(),
+        )
+        program.drop_unused()
+        return program
+
+    def _answers(self) -> list[Answer]:
+        values = [self.result] if len(self.outputs) == 1 else self._several()
+        return [self._answer(side, value) for side, value in zip(self.outputs, values, strict=True)]
+
+    def _several(self) -> Sequence[Value]:
+        value = self.result
+        if value is None:
+            return [None] * len(self.outputs)
+        if isinstance(value, Maybe) and isinstance(value.value, tuple):
+            value = tuple(Maybe(value.condition, item) for item in value.value)
+        if not isinstance(value, tuple) or len(value) != len(self.outputs):
+            self._refuse(
+                f"the function returns {described(value)}, not {len(self.outputs)} messages",
+                "return a tuple with a message, or None, for each output",
+            )
+        return value
+
+    def _answer(self, side: Side, value: Value) -> Answer:
+        condition = self.graph.true()
+        while isinstance(value, Maybe):
+            condition, value = self.graph.both(condition, value.condition), value.value
+        if value is None:
+            return Answer(
+                side,
+                self.graph.constant(value=False),
+                self._fields(side, None),
+                [Sent(part, None) for part in side.parts],
+            )
+        if not isinstance(value, Record):
+            self._refuse(
+                f"the function returns {described(value)}, not a message",
+                "return {'field': value}, or None to send nothing",
+            )
+        self._check_names(side.frame.names, value)
+        fields = self._fields(side, value)
+        return Answer(side, condition, fields, [self._sent(part, value) for part in side.parts])
+
+    def _check_names(self, known: Any, value: Record, path: str = "") -> None:
+        for name, item in self.interpreter.memory.cells[value].items():
+            if name not in known:
+                self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
+            if isinstance(item, Record):
+                self._check_names(known[name], item, f"{path}{name}.")
+
+    def _fields(self, side: Side, value: Record | None) -> dict[str, list[Node]]:
+        found: dict[str, list[Node]] = {}
+        for leaf in side.leaves:
+            defaults = _defaults(side, leaf.path)
+            for element, steps in enumerate(places(leaf)):
+                given = self._at(value, steps)
+                fallback = self.graph.constant(defaults[element % len(defaults)])
+                found.setdefault(leaf.port, []).append(
+                    self._field(fallback if given is None else given, leaf.kind, steps)
+                )
+        return found
+
+    def _at(self, value: Value, steps: Sequence[str | int]) -> Value:
+        """Return the value at a path of an answer, or None without one."""
+        for step in steps:
+            if isinstance(value, tuple) and isinstance(step, int):
+                value = value[step] if step < len(value) else None
+            elif isinstance(value, Record | Array):
+                value = self.interpreter.memory.cells[value].get(step)
+            elif value is not None:
+                self._refuse(f"field '{step}' is in {described(value)}, which has no fields")
+        return value
+
+    def _field(self, value: Value, kind: Kind, steps: Sequence[str | int]) -> Node:
+        name = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
+        if isinstance(value, Unbound):
+            self._refuse(f"field '{name}' has no value on one of the paths", "give it one on each path")
+        if not isinstance(value, Node):
+            self._refuse(f"field '{name}' is {described(value)}, not a number")
+        if value.kind.is_float and not kind.is_float:
+            self._refuse(
+                f"field '{name}' is an integer ({kind}), and the answer is a {value.kind}",
+                "convert it with int() or round()",
+            )
+        made: Node = self.interpreter.checked(self.node, self.interpreter.arithmetic.to, value, kind)
+        return made
+
+    def _sent(self, part: Part, value: Record) -> Sent:
+        given = self._at(value, names_of(part.path))
+        name = dotted(names_of(part.path))
+        match given:
+            case None | "":
+                return Sent(part, None)
+            case Array() if not self.interpreter.memory.cells[given]:
+                return Sent(part, None)
+            case Stream():
+                return Sent(part, given)
+            case Produced(loop=loop, element=element) if part.kind:
+                return Sent(part, Produced(loop, self._field(element, part.kind, names_of(part.path))))
+        return self._refuse(
+            f"'{name}' is {described(given)}",
+            "pass one of the message on, or append to an empty list in a loop over an array",
+        )
+
+
+def _defaults(side: Side, path: Any) -> list[Any]:
+    """Return the default values of a field's elements."""
+    leaf = next(item for item in _leaves(side) if item.path == path)
+    given = leaf.default
+    if given is None:
+        return [False if leaf.type.name == "bool" else 0]
+    return [*given] if isinstance(given, tuple) else [given]
+
+
+def _leaves(side: Side) -> Iterator[Any]:
+    from fusesoc_firm.frame.model import Fixed, all_nodes
+
+    for node in all_nodes(side.frame.nodes):
+        if isinstance(node, Fixed):
+            yield from node.fields

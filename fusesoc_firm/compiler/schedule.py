@@ -1,0 +1,216 @@
+"""The time of each operation: steps within the phases of a program.
+
+Each phase has its own steps. An operator takes its operands at the end of a step, into registers, and its result can
+be read from one step on. All other operations are combinational: they are evaluated in the step in which their operands
+can be read, if the delay since a register remains below a budget.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from fusesoc_firm.compiler.graph import LEAVES, Node
+from fusesoc_firm.compiler.kinds import BOOL
+from fusesoc_firm.compiler.operators import Operator, is_operator, operator_of
+from fusesoc_firm.compiler.program import Program
+
+# Operations that are part of the reader's expression: wires, or one inverter a bit.
+TRANSPARENT = ("negate", "absolute", "copy_sign", "rename", "wrap", "shift_left", "shift_right", "invert")
+# Delays in tenths of a nanosecond in an ECP5-8, and the most that lie between two registers.
+_BUDGET = 60
+_SELECTION = 15
+_LOGIC, _CHOICE, _EQUALITY, _CARRY, _PER_BIT = 3, 8, 20, 20, 0.35
+
+
+@dataclass(frozen=True)
+class Time:
+    """The step of a phase in which a value can be read, and the delay since the last register."""
+
+    phase: int
+    step: int
+    delay: int = 0
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One instance of an operator."""
+
+    operator: Operator
+    number: int
+
+
+@dataclass
+class Issue:
+    """An operation on a unit: the step at whose end it takes its operands, and the step of its result."""
+
+    node: Node
+    unit: Unit
+    start: int
+    ready: int
+
+
+@dataclass
+class Schedule:
+    """The times of all values; `steps` is the number of steps of each phase."""
+
+    program: Program
+    steps: list[int]
+    times: dict[int, Time] = field(default_factory=dict)
+    issues: dict[int, Issue] = field(default_factory=dict)
+    units: list[Unit] = field(default_factory=list)
+
+    @property
+    def latency(self) -> int:
+        """The cycles from a message to its answer, without the elements of streams."""
+        return sum(self.steps[::2]) + 1
+
+    @property
+    def bases(self) -> list[int]:
+        """The first step of each phase, counted from the begin of the program, and the step after the last one."""
+        found = [0]
+        for count in self.steps:
+            found.append(found[-1] + count)
+        return found
+
+
+def scheduled(program: Program, limits: Mapping[str, int] | None = None, form: str = "default") -> Schedule:
+    """Return the schedule of a program with at most `limits` units of an operation (default: 1)."""
+    nodes = program.needed()
+    last = max((2 * part.number + 2 for side in program.inputs for part in side.parts), default=0)
+    schedule = Schedule(program, [0] * (last + 1))
+    builder = _Builder(schedule, limits or {}, form)
+    for phase in range(last + 1):
+        builder.run(phase, [node for node in nodes if node.phase == phase and node.operation not in LEAVES])
+    return schedule
+
+
+class _Builder:
+    """List scheduling by the longest path, phase by phase."""
+
+    def __init__(self, schedule: Schedule, limits: Mapping[str, int], form: str) -> None:
+        self.schedule, self.limits, self.form = schedule, limits, form
+        self.free: dict[Unit, int] = {}
+        self.waits: list[int] = []
+        self.loops = {2 * loop.number + 1: loop for loop in schedule.program.loops}
+
+    def run(self, phase: int, nodes: Sequence[Node]) -> None:
+        self.free = dict.fromkeys(self.schedule.units, 0)
+        self.waits = []
+        waiting = [node for node in nodes if is_operator(node)]
+        urgency = self._urgency(nodes)
+        step = 0
+        while waiting:
+            ready = [node for node in waiting if self._is_ready(node, phase, step)]
+            for node in sorted(ready, key=lambda item: (-urgency[item.number], item.number)):
+                if self._start(node, phase, step):
+                    waiting.remove(node)
+            step += 1
+        self.schedule.steps[phase] = self._length(phase, nodes)
+
+    def _urgency(self, nodes: Sequence[Node]) -> dict[int, float]:
+        """Return the longest path from each node to the end of the phase, in steps."""
+        found = {node.number: 0.0 for node in nodes}
+        for node in reversed(nodes):
+            own = operator_of(node, self.form).latency + 1 if is_operator(node) else _delay(node) / _BUDGET
+            found[node.number] += own
+            for item in node.operands:
+                if item.number in found:
+                    found[item.number] = max(found[item.number], found[node.number])
+        return found
+
+    def _is_ready(self, node: Node, phase: int, step: int) -> bool:
+        times = [self.time(item, phase) for item in node.operands]
+        return all(
+            time is not None and (time.step < step or (time.step == step and time.delay <= _BUDGET - _SELECTION))
+            for time in times
+        )
+
+    def _start(self, node: Node, phase: int, step: int) -> bool:
+        """Issue an operation at a step if a unit is free; return whether it is issued."""
+        operator = operator_of(node, self.form)
+        end = step + 1 + operator.latency
+        if not operator.has_wait and any(step < wait < end for wait in self.waits):
+            # While a result is awaited, the results of pipelines would pass.
+            return False
+        unit = self._free_unit(operator, step)
+        if unit is None:
+            return False
+        self.free[unit] = end if operator.has_wait else step + 1
+        if operator.has_wait:
+            self.waits.append(end)
+        self.schedule.issues[node.number] = Issue(node, unit, step, end)
+        self.schedule.times[node.number] = Time(phase, end)
+        return True
+
+    def _free_unit(self, operator: Operator, step: int) -> Unit | None:
+        own = [unit for unit in self.schedule.units if unit.operator == operator]
+        for unit in own:
+            if self.free.get(unit, 0) <= step:
+                return unit
+        if len(own) >= self.limits.get(operator.operation, 1):
+            return None
+        unit = Unit(operator, len(own))
+        self.schedule.units.append(unit)
+        return unit
+
+    def time(self, node: Node, phase: int) -> Time | None:
+        """Return when a value can be read in a phase, or None if an operation before it has no time yet."""
+        if node.operation in LEAVES or node.phase < phase:
+            return Time(phase, 0)
+        if node.number in self.schedule.times or is_operator(node):
+            return self.schedule.times.get(node.number)
+        found = [self.time(item, phase) for item in node.operands]
+        times = [time for time in found if time is not None]
+        if len(times) < len(found):
+            return None
+        made = self._evaluated(node, phase, times)
+        self.schedule.times[node.number] = made
+        return made
+
+    def _evaluated(self, node: Node, phase: int, times: Sequence[Time]) -> Time:
+        step = max(time.step for time in times)
+        before = max(time.delay for time in times if time.step == step)
+        if node.operation in TRANSPARENT:
+            return Time(phase, step, before)
+        late = before + _delay(node)
+        condition = times[0]
+        # A comparison before a choice of numbers becomes a register of one bit, unless each element needs a step.
+        has_flag = (
+            node.operation == "choose" and node.kind != BOOL and condition.step == step and condition.delay > _LOGIC
+        )
+        if late > _BUDGET or (has_flag and phase % 2 == 0):
+            return Time(phase, step + 1, _delay(node))
+        return Time(phase, step, late)
+
+    def _length(self, phase: int, nodes: Sequence[Node]) -> int:
+        """Return the number of steps of a phase: all its values are in registers at the end."""
+        ends = [time.step + 1 for node in nodes if (time := self.time(node, phase)) is not None]
+        loop = self.loops.get(phase)
+        if loop is not None or phase + 1 in self.loops:
+            # A loop has a step for each element, and one before for the first values.
+            return max(ends, default=1) + (phase % 2 == 0 and bool(ends))
+        return max(ends, default=0)
+
+
+def _delay(node: Node) -> int:
+    """Return the delay of a combinational operation."""
+    operand = node.operands[0]
+    match node.operation:
+        case "and" | "or" | "xor":
+            return _LOGIC
+        case "choose":
+            return _CHOICE if node.kind != BOOL else _LOGIC
+        case "equal":
+            return _EQUALITY
+        case "less" | "at_most" | "add" | "subtract":
+            return int(_CARRY + _PER_BIT * operand.bits)
+        case "multiply":
+            return _BUDGET
+    return 0
+
+
+def printed(schedule: Schedule) -> Iterator[str]:
+    """Yield a line for each operation on a unit, in the order of time."""
+    for item in sorted(schedule.issues.values(), key=lambda issue: (issue.node.phase, issue.start)):
+        yield f"phase {item.node.phase} step {item.start}: {item.unit.operator.entity} {item.unit.number}: {item.node}"

@@ -1,0 +1,554 @@
+"""From a bound schedule to the configuration of the template `python_accelerator.vhd`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fusesoc_firm.compiler.binding import Binding, Register
+from fusesoc_firm.compiler.graph import LEAVES, Node
+from fusesoc_firm.compiler.interface import Part, element_signal
+from fusesoc_firm.compiler.kinds import BOOL, INT, bits_of
+from fusesoc_firm.compiler.operators import is_operator
+from fusesoc_firm.compiler.paths import Loop
+from fusesoc_firm.compiler.program import Answer, Sent
+from fusesoc_firm.compiler.schedule import TRANSPARENT, Issue, Unit
+from fusesoc_firm.compiler.values import Produced, Stream
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.text.naming import KEYWORDS, VHDL_PREDEFINED, distinct_identifiers
+from fusesoc_firm.text.render import Context
+
+TEMPLATE = "vhdl/python_accelerator.vhd"
+
+# The signals of the template.
+_SIGNALS = (
+    "step_r advance holds is_open is_checked accepted done sent_r firm rtl work ieee operations control clk rst_n"
+).split()
+_INTEGER_OPERATORS = {"add": "+", "subtract": "-"}
+_LONGEST_COMMENT = 90
+
+
+@dataclass
+class Writer:
+    """The text of a program; each method returns a part of the template's configuration."""
+
+    binding: Binding
+    _names: dict[Any, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.schedule = self.binding.schedule
+        self.program = self.schedule.program
+        self.bases = self.schedule.bases
+        self.last = self.bases[-1]
+        self.nodes = self.program.needed()
+        self.streams = [(side, part) for side in self.program.inputs for part in side.parts]
+        self._constants: dict[tuple[int, int], str] = {}
+        self._name_all()
+
+    # Names.
+
+    def _name_all(self) -> None:
+        wanted: list[tuple[Any, str]] = []
+        for state in self.program.states:
+            wanted.append((("leaf", state.value.number), f"{state.path.split('.', 1)[-1]}_state_r"))
+        for loop in self.program.loops:
+            for item in loop.carried.values():
+                wanted.append((("carried", loop.number, item.value.payload), f"{item.name}_r"))
+        for register in self.binding.registers:
+            wanted.append((id(register), f"{self._register_name(register)}_r"))
+        for node in self.nodes:
+            if self._has_signal(node):
+                wanted.append((node.number, node.name or f"{node.operation}_{node.number}"))
+        for unit in self.schedule.units:
+            wanted.append((unit, f"{unit.operator.operation}_{unit.operator.operand}_{unit.number}"))
+        ports = [leaf.port for answer in self.program.answers for leaf in answer.side.leaves]
+        ports += [leaf.port for side in self.program.inputs for leaf in side.leaves]
+        reserved = [*_SIGNALS, *KEYWORDS, *VHDL_PREDEFINED, *ports]
+        names = distinct_identifiers([_words(name) for _, name in wanted], reserved)
+        self._names = {key: name for (key, _), name in zip(wanted, names, strict=True)}
+
+    def _register_name(self, register: Register) -> str:
+        first = register.values[0]
+        issue = self.schedule.issues.get(first.number)
+        if len(register.values) == 1 or issue is None:
+            return first.name or f"{first.operation}_{first.number}"
+        return f"{issue.unit.operator.operation}_value"
+
+    def _has_signal(self, node: Node) -> bool:
+        return node.operation not in LEAVES and node.operation not in TRANSPARENT and not is_operator(node)
+
+    # Expressions.
+
+    def value(self, node: Node, phase: int, step: int) -> str:
+        """Return the expression of a value in a step of a phase."""
+        match node.operation:
+            case "constant":
+                return self._constant(node)
+            case "input":
+                return str(node.payload)
+            case "state":
+                return self._names["leaf", node.number]
+            case "carried":
+                return self._names["carried", node.payload[0], node.payload]
+            case "final":
+                return self._names["carried", *node.payload]
+        if node.operation in TRANSPARENT:
+            return self._transparent(node, phase, step)
+        time = self.schedule.times[node.number]
+        if (time.phase, time.step) != (phase, step):
+            return self._names[id(self.binding.by_node[node.number])]
+        if is_operator(node):
+            return f"{self._names[self.schedule.issues[node.number].unit]}_result"
+        return self._names[node.number]
+
+    def fitted(self, node: Node, bits: int, phase: int, step: int) -> str:
+        """Return the expression of a value with a number of bits: integers of Python have those of their ranges."""
+        if node.kind != INT or node.bits == bits:
+            return self.value(node, phase, step)
+        if node.is_constant:
+            return self._constant(node, bits)
+        return f"std_logic_vector({_signed_number(node, self.value(node, phase, step), bits)})"
+
+    def _constant(self, node: Node, bits: int = 0) -> str:
+        if node.kind == BOOL:
+            return "'1'" if node.payload else "'0'"
+        width = bits or node.bits
+        key = (width, bits_of(node.kind, node.payload, width))
+        return self._constants.setdefault(key, f"constant_{len(self._constants)}")
+
+    def _transparent(self, node: Node, phase: int, step: int) -> str:
+        given = [self.value(item, phase, step) for item in node.operands]
+        match node.operation:
+            case "negate":
+                return f"negated({given[0]})"
+            case "absolute":
+                return f"magnitude({given[0]})"
+            case "copy_sign":
+                return f"with_sign_of({given[0]}, {given[1]})"
+            case "invert" if node.kind == BOOL:
+                return f"(not {given[0]})"
+            case "invert":
+                return self._cast(node, f"not {self._signed(node.operands[0], given[0], node)}")
+            case "wrap":
+                return self._cast(node, self._signed(node.operands[0], given[0], node))
+            case "shift_left":
+                return self._cast(node, f"shift_left({self._signed(node.operands[0], given[0], node)}, {node.payload})")
+            case "shift_right":
+                # The bits above the result's are shifted into it.
+                wide = node.operands[0].bits
+                shifted = f"shift_right({self._signed(node.operands[0], given[0], node.operands[0])}, {node.payload})"
+                return self._cast(node, f"fitted({shifted}, {node.bits})" if wide != node.bits else shifted)
+        return given[0]
+
+    def _signed(self, operand: Node, text: str, result: Node) -> str:
+        """Return an integer operand as a number with the result's width."""
+        return _number(operand, text, result.bits)
+
+    def _cast(self, node: Node, text: str) -> str:
+        return f"std_logic_vector({text})"
+
+    def _combinational(self, node: Node) -> str:
+        """Return the expression of an operation from its operands in the step in which it is evaluated."""
+        time = self.schedule.times[node.number]
+        given = [self.value(item, time.phase, time.step) for item in node.operands]
+        match node.operation:
+            case "choose":
+                pair = [self.fitted(item, node.bits, time.phase, time.step) for item in node.operands[1:]]
+                return f"chosen({given[0]}, {pair[0]}, {pair[1]})"
+            case "and" | "or" | "xor" if node.kind == BOOL:
+                return f"{given[0]} {node.operation} {given[1]}"
+            case "less" | "at_most" | "equal":
+                return self._comparison(node, given)
+            case "and" | "or" | "xor":
+                pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
+                return f"std_logic_vector({pair[0]} {node.operation} {pair[1]})"
+            case "multiply":
+                pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
+                return f"std_logic_vector(fitted({pair[0]} * {pair[1]}, {node.bits}))"
+        pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
+        return f"std_logic_vector({pair[0]} {_INTEGER_OPERATORS[node.operation]} {pair[1]})"
+
+    def _comparison(self, node: Node, given: Sequence[str]) -> str:
+        one = node.operands[0]
+        if one.kind.is_float:
+            return f"is_{node.operation}({given[0]}, {given[1]}, {one.kind.exponent_bits})"
+        # With a bit for the sign, all integers are compared as signed ones.
+        bits = max(item.bits + (not item.is_signed) for item in node.operands)
+        pair = [_signed_number(item, text, bits) for item, text in zip(node.operands, given, strict=True)]
+        return f"to_bit_of({pair[0]} {'<' if node.operation == 'less' else '='} {pair[1]})"
+
+    # The parts of the template.
+
+    def configuration(self, entity: str, ports: Sequence[Context], width: int) -> Context:
+        """Return the configuration of the entity with these ports."""
+        loads = self._loads()
+        signals = [
+            {
+                "name": self._names[node.number],
+                "type": _type(node.bits, node.kind == BOOL),
+                "value": self._combinational(node),
+            }
+            for node in self.nodes
+            if self._has_signal(node)
+        ]
+        answers = [self._answer(number, answer) for number, answer in enumerate(self.program.answers)]
+        inputs = [self._input(part) for _, part in self.streams]
+        states = [self._state(state) for state in self.program.states]
+        made = {
+            "entity": entity,
+            "source": self.program.source.name.rpartition("/")[2],
+            "function": self.program.name,
+            "width": width,
+            "ports": [*ports],
+            "last": self.last,
+            "has_streams": bool(self.streams) or any(answer.side.parts for answer in self.program.answers),
+            "open": " and ".join(self._open_conditions()),
+            "checked": " and ".join(f"{side.prefix}msg_valid" for side in self.program.inputs),
+            "readies": [f"{side.prefix}msg_ready" for side in self.program.inputs],
+            "answer_count": len(answers),
+            "finished": " and ".join(
+                f"(sent_r({item['number']}) or not {item['condition']})"
+                if item["is_conditional"]
+                else f"sent_r({item['number']})"
+                for item in answers
+            ),
+            "holds": self._holds(),
+            "jumps": self._jumps(),
+            "units": [self._unit(unit) for unit in self.schedule.units],
+            "combinational": signals,
+            "loads": loads,
+            "registers": self._registers(),
+            "states": states,
+            "answers": answers,
+            "inputs": inputs,
+        }
+        # The constants are known when all expressions are written.
+        made["constants"] = self._written_constants()
+        return made
+
+    def _open_conditions(self) -> Iterator[str]:
+        for side in self.program.inputs:
+            yield f"{side.prefix}msg_valid" if side.is_fixed else f"{side.prefix}segment_valid(0)"
+
+    def _written_constants(self) -> list[Context]:
+        """Return the constants, in pieces of at most 32 bits: GHDL 2 loses zeros of longer ones."""
+        return [
+            {
+                "name": name,
+                "bits": bits,
+                "pieces": [
+                    {
+                        "high": min(low + 31, bits - 1),
+                        "low": low,
+                        "value": f"{code >> low & (1 << min(32, bits - low)) - 1:0{min(32, bits - low)}b}",
+                    }
+                    for low in range(0, bits, 32)
+                ],
+            }
+            for (bits, code), name in self._constants.items()
+        ]
+
+    def _registers(self) -> list[Context]:
+        found = [
+            {"name": self._names[id(register)], "type": _type(register.bits, register.values[0].kind == BOOL)}
+            for register in self.binding.registers
+        ]
+        for loop in self.program.loops:
+            found += [
+                {
+                    "name": self._names["carried", loop.number, item.value.payload],
+                    "type": _type(item.value.bits, item.value.kind == BOOL),
+                }
+                for item in loop.carried.values()
+            ]
+        for unit in self.schedule.units:
+            ports = self._operand_names(unit)
+            found += [{"name": name, "type": vhdl_type(unit.operator.operand)} for name in ports]
+        return found
+
+    def _operand_names(self, unit: Unit) -> list[str]:
+        base = self._names[unit]
+        return [f"{base}_{port.removeprefix('in_')}_r" for port in unit.operator.inputs]
+
+    def _unit(self, unit: Unit) -> Context:
+        operator, base = unit.operator, self._names[unit]
+        issues = [item for item in self.schedule.issues.values() if item.unit == unit]
+        steps = [self.bases[item.node.phase] + item.ready for item in issues]
+        return {
+            "name": base,
+            "entity": operator.entity,
+            "generics": [{"name": name, "value": value} for name, value in operator.generics],
+            "operands": [
+                {"port": port, "signal": signal}
+                for port, signal in zip(operator.inputs, self._operand_names(unit), strict=True)
+            ],
+            "output": operator.output,
+            "result": f"{base}_result",
+            "type": vhdl_type(operator.width),
+            "has_wait": operator.has_wait,
+            "is_pipeline": not operator.has_wait,
+            "taken": " or ".join(f"step_r = {step}" for step in sorted(steps)),
+            "starts": " or ".join(f"step_r = {self.bases[item.node.phase] + item.start}" for item in issues),
+        }
+
+    def _holds(self) -> list[Context]:
+        """Return the steps that wait, each with the condition that ends the wait."""
+        found: dict[int, list[str]] = {}
+        for phase, count in enumerate(self.schedule.steps):
+            if count and phase % 2 == 0 and (phase == 0 or self.streams):
+                found.setdefault(self.bases[phase], []).append(self._segment(phase // 2))
+        for loop in self.program.loops:
+            part = self._part(loop)
+            phase = 2 * loop.number + 1
+            found.setdefault(self.bases[phase], []).append(f"{element_signal(part)}_valid")
+            for sent in self._sent_of(loop):
+                found.setdefault(self.bases[phase + 1] - 1, []).append(f"{sent.part.stream}_made_ready")
+        for item in self.schedule.issues.values():
+            if item.unit.operator.has_wait:
+                step = self.bases[item.node.phase] + item.ready
+                found.setdefault(step, []).append(f"{self._names[item.unit]}_valid")
+        found.setdefault(self.last, []).append("accepted")
+        return [{"step": step, "condition": " and ".join(conditions)} for step, conditions in sorted(found.items())]
+
+    def _segment(self, number: int) -> str:
+        """Return the condition that the fields of a segment are valid."""
+        conditions = ["is_open"]
+        conditions += [
+            f"{side.prefix}segment_valid({number})" for side in self.program.inputs if not side.is_fixed and number
+        ]
+        return " and ".join(conditions)
+
+    def _jumps(self) -> list[Context]:
+        """Return the steps that are not followed by the next one: those around loops."""
+        found = []
+        for loop in self.program.loops:
+            part, phase = self._part(loop), 2 * loop.number + 1
+            first, after = self.bases[phase], self.bases[phase + 1]
+            found.append({"step": first - 1, "condition": f"unsigned({part.length}) = 0", "target": after})
+            found.append({"step": after - 1, "condition": f"{element_signal(part)}_last = '0'", "target": first})
+        return found
+
+    def _part(self, loop: Loop) -> Part:
+        return next(part for _, part in self.streams if part.number == loop.number)
+
+    def _sent_of(self, loop: Loop) -> list[Sent]:
+        return [
+            sent
+            for answer in self.program.answers
+            for sent in answer.parts
+            if isinstance(sent.value, Produced) and sent.value.loop == loop.number
+        ]
+
+    def _loads(self) -> list[Context]:
+        """Return the registers that each step loads, with the lines of the source."""
+        found: dict[int, list[tuple[str, str, Node | None]]] = {}
+
+        def load(phase: int, step: int, target: str, node: Node, bits: int) -> None:
+            text = self.fitted(node, bits, phase, step)
+            found.setdefault(self.bases[phase] + step, []).append((target, text, node))
+
+        for item in self.schedule.issues.values():
+            for target, operand in zip(self._operand_names(item.unit), item.node.operands, strict=True):
+                text = self._operand(item, operand)
+                found.setdefault(self.bases[item.node.phase] + item.start, []).append((target, text, item.node))
+        for number, register in self.binding.by_node.items():
+            node = self.program.graph.nodes[number]
+            time = self.schedule.times[number]
+            load(time.phase, time.step, self._names[id(register)], node, register.bits)
+        for loop in self.program.loops:
+            phase = 2 * loop.number + 1
+            for carried in loop.carried.values():
+                target = self._names["carried", loop.number, carried.value.payload]
+                load(phase - 1, self.schedule.steps[phase - 1] - 1, target, carried.first, carried.value.bits)
+                assert carried.next is not None
+                if carried.next is not carried.value:
+                    load(phase, self.schedule.steps[phase] - 1, target, carried.next, carried.value.bits)
+        return [{"step": step, "lines": _commented(lines)} for step, lines in sorted(found.items())]
+
+    def _operand(self, issue: Issue, operand: Node) -> str:
+        """Return an operand of a unit; an integer has the unit's width."""
+        text = self.value(operand, issue.node.phase, issue.start)
+        if operand.kind.is_float:
+            return text
+        return f"std_logic_vector({_signed_number(operand, text, issue.unit.operator.operand)})"
+
+    def _state(self, state: Any) -> Context:
+        end = len(self.schedule.steps)
+        return {
+            "name": self._names["leaf", state.value.number],
+            "type": _type(state.value.bits, state.value.kind == BOOL),
+            "first": self.fitted(state.first, state.value.bits, end, 0),
+            "next": self.fitted(state.next, state.value.bits, end, 0),
+            "path": state.path,
+        }
+
+    # Answers.
+
+    def _answer(self, number: int, answer: Answer) -> Context:
+        side = answer.side
+        end = len(self.schedule.steps)
+        condition = self.value(answer.condition, end, 0)
+        is_conditional = not answer.condition.is_constant or not answer.condition.payload
+        return {
+            "prefix": side.prefix,
+            "number": number,
+            "is_fixed": side.is_fixed,
+            "has_parts": not side.is_fixed,
+            "condition": condition,
+            "segments_high": side.segments - 1,
+            "is_conditional": is_conditional,
+            "segments": [self._answer_segment(answer, segment) for segment in range(side.segments)],
+            "fields": [{"port": leaf.port, "values": self._field(answer.fields[leaf.port])} for leaf in side.leaves],
+            "lengths": [self._length(sent) for sent in answer.parts],
+            "passed": [self._passed(sent) for sent in answer.parts if isinstance(sent.value, Stream)],
+            "made": [self._made(sent) for sent in answer.parts if isinstance(sent.value, Produced)],
+            "empty": [sent.part.stream for sent in answer.parts if sent.value is None],
+        }
+
+    def _field(self, values: Sequence[Node]) -> str:
+        end = len(self.schedule.steps)
+        texts = [self._quiet(node, self.value(node, end, 0)) for node in values]
+        if len(texts) == 1 and values[0].kind != BOOL:
+            return texts[0]
+        # Element 0 is in the lowest bits.
+        return " & ".join(reversed(texts))
+
+    def _quiet(self, node: Node, text: str) -> str:
+        """Return a float with the only NaN of hardware."""
+        return f"quiet({text}, {node.kind.exponent_bits})" if node.kind.is_float and _may_be_odd(node) else text
+
+    def _answer_segment(self, answer: Answer, segment: int) -> Context:
+        conditions: dict[str, None] = {}
+        for leaf in answer.side.leaves:
+            if leaf.segment == segment:
+                for node in answer.fields[leaf.port]:
+                    conditions |= dict.fromkeys(self._valid(node))
+        for sent in answer.parts:
+            if sent.part.segment == segment:
+                conditions |= dict.fromkeys(self._valid(_length_of(sent, self.program.loops)))
+        return {"number": segment, "conditions": [*conditions]}
+
+    def _valid(self, node: Node | None) -> Iterator[str]:
+        """Yield the conditions that a value is valid, for a message that is open."""
+        if node is None or node.operation in ("constant", "state"):
+            return
+        if node.operation == "input":
+            if node.phase:
+                yield self._segment(node.phase // 2)
+            return
+        if node.operation in TRANSPARENT:
+            for item in node.operands:
+                yield from self._valid(item)
+            return
+        after = node.phase if node.operation == "final" else node.phase + 1
+        yield f"to_bit_of(step_r >= {self.bases[after]})"
+
+    def _length(self, sent: Sent) -> Context:
+        node = _length_of(sent, self.program.loops)
+        text = "(others => '0')" if node is None else node.payload.port
+        return {"port": sent.part.length, "value": text}
+
+    def _passed(self, sent: Sent) -> Context:
+        assert isinstance(sent.value, Stream)
+        return {"to": sent.part.stream, "from": sent.value.name}
+
+    def _made(self, sent: Sent) -> Context:
+        assert isinstance(sent.value, Produced)
+        loop = next(item for item in self.program.loops if item.number == sent.value.loop)
+        phase = 2 * loop.number + 1
+        last = self.schedule.steps[phase] - 1
+        part = self._part(loop)
+        value = self._quiet(sent.value.element, self.value(sent.value.element, phase, last))
+        return {
+            "stream": sent.part.stream,
+            "bits": sent.part.bits,
+            "lanes": sent.part.bits // 8,
+            "value": value,
+            "step": self.bases[phase] + last,
+            "valid": f"{element_signal(part)}_valid",
+            "last": f"{element_signal(part)}_last",
+        }
+
+    def _input(self, part: Part) -> Context:
+        loop = next((item for item in self.program.loops if item.number == part.number), None)
+        passed = [
+            sent.part.stream
+            for answer in self.program.answers
+            for sent in answer.parts
+            if isinstance(sent.value, Stream) and sent.value.number == part.number
+        ]
+        step = self.bases[2 * part.number + 2] - 1 if loop else 0
+        return {
+            "stream": part.stream,
+            "element": element_signal(part),
+            "bits": part.bits,
+            "lanes": part.bits // 8,
+            "is_looped": loop is not None,
+            "is_dropped": loop is None and not passed,
+            "step": step,
+        }
+
+
+def _length_of(sent: Sent, loops: Iterable[Loop]) -> Node | None:
+    """Return the number of elements of a part of an answer, or None if it is empty."""
+    match sent.value:
+        case Stream(length=length):
+            return length
+        case Produced(loop=number):
+            return next(item.stream.length for item in loops if item.number == number)
+    return None
+
+
+def _may_be_odd(node: Node) -> bool:
+    """Whether a NaN may have other bits than the quiet NaN: that of a message, or with a changed sign."""
+    if node.operation in ("negate", "copy_sign", "absolute", "input"):
+        return True
+    if node.operation == "choose":
+        return any(_may_be_odd(item) for item in node.operands[1:])
+    # A state or carried value may come from one of these.
+    return node.operation in ("state", "carried", "final", "rename")
+
+
+def _commented(lines: Sequence[tuple[str, str, Node | None]]) -> list[Context]:
+    """Return the lines of a step in the order of the source; a comment names each new line of it."""
+    found: list[Context] = []
+    before = None
+    for target, text, node in sorted(
+        lines, key=lambda item: (item[2].place.line if item[2] and item[2].place else 0, item[0])
+    ):
+        place = node.place if node else None
+        comment = (
+            f"line {place.line}: {place.text[:_LONGEST_COMMENT]}"
+            if place and place is not before and place.text
+            else ""
+        )
+        if place and before and place.line == before.line:
+            comment = ""
+        found.append({"comment": comment, "target": target, "value": text})
+        before = place
+    return found
+
+
+def _words(name: str) -> tuple[str, ...]:
+    return ("".join(char if char.isalnum() else "_" for char in name).strip("_") or "value",)
+
+
+def _type(bits: int, is_bit: bool) -> str:
+    return vhdl_type(None if is_bit else bits)
+
+
+def _number(node: Node, text: str, bits: int) -> str:
+    """Return an integer as a number of a width; its sign decides how it is extended."""
+    if node.kind == BOOL:
+        text, bits_here, is_signed = f"from_bit({text})", 2, True
+    else:
+        bits_here, is_signed = node.bits, node.is_signed
+    made = f"{'signed' if is_signed else 'unsigned'}({text})"
+    made = made if bits_here == bits else f"fitted({made}, {bits})"
+    return made if is_signed else f"signed({made})"
+
+
+def _signed_number(node: Node, text: str, bits: int) -> str:
+    """Return an integer as a signed number of a width."""
+    return _number(node, text, bits)
