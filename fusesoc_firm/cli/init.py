@@ -64,9 +64,9 @@ def add_init(commands: Any) -> None:
     init.add_argument(
         "--language",
         type=_language,
-        choices=("vhdl", "verilog", "hls", "python"),
-        help="the accelerator's language; hls is C++, which AMD Vitis HLS builds and g++ simulates; python runs on the "
-        "host, behind hardware (default: vhdl)",
+        choices=("vhdl", "verilog", "python", "hls", "software"),
+        help="the accelerator's language; python is compiled to hardware; hls is C++, which AMD Vitis HLS builds and "
+        "g++ simulates; software is Python that runs on the host, behind hardware (default: vhdl)",
     )
     init.add_argument(
         "--width", choices=[str(2**n) for n in range(3, 10)], help="width in bits of the streams (default: 8)"
@@ -163,7 +163,7 @@ def _start(arguments: argparse.Namespace) -> None:
         spec = folder / f"{project.name}.yaml"
         print(f"maxLength: messages of up to {usual.bytes} bytes ({usual.example}); change it in {spec}")
     model = f", {folder / 'model.py'} (the responses that it must give)"
-    print(f"edit: {folder / source} (the computation){'' if project.language == 'python' else model}")
+    print(f"edit: {folder / source} (the computation){'' if project.language in ('python', 'software') else model}")
     if project.language == "hls":
         print("hardware: AMD Vitis HLS builds the function; 'firm sim' needs only g++ and GHDL")
     print(f"next: cd {folder} && firm sim{' && firm test' if project.has_bench else ''}")

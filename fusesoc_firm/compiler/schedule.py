@@ -93,20 +93,53 @@ class _Builder:
         self.free: dict[Unit, int] = {}
         self.waits: list[int] = []
         self.loops = {2 * loop.number + 1: loop for loop in schedule.program.loops}
+        # Of the phase that is scheduled: the users of each value, the operands that each lacks, and what can start.
+        self.phase = 0
+        self.users: dict[int, list[Node]] = {}
+        self.lacking: dict[int, int] = {}
+        self.ready: list[Node] = []
 
     def run(self, phase: int, nodes: Sequence[Node]) -> None:
+        """Schedule the operations of a phase, which are in the order of their operands."""
+        self.phase, self.waits, self.ready = phase, [], []
         self.free = dict.fromkeys(self.schedule.units, 0)
-        self.waits = []
-        waiting = [node for node in nodes if is_operator(node)]
+        own = {node.number for node in nodes}
+        self.users = {number: [] for number in own}
+        self.lacking = {}
+        for node in nodes:
+            inner = [item for item in node.operands if item.number in own]
+            self.lacking[node.number] = len(inner)
+            for item in inner:
+                self.users[item.number].append(node)
         urgency = self._urgency(nodes)
-        step = 0
-        while waiting:
-            ready = [node for node in waiting if self._is_ready(node, phase, step)]
-            for node in sorted(ready, key=lambda item: (-urgency[item.number], item.number)):
-                if self._start(node, phase, step):
-                    waiting.remove(node)
+        for node in [item for item in nodes if not self.lacking[item.number]]:
+            self._enter(node)
+        left, step = sum(map(is_operator, nodes)), 0
+        while left:
+            for node in sorted(self.ready, key=lambda item: (-urgency[item.number], item.number)):
+                if self._can_start(node, step) and self._start(node, step):
+                    self.ready.remove(node)
+                    left -= 1
             step += 1
         self.schedule.steps[phase] = self._length(phase, nodes)
+
+    def _enter(self, node: Node) -> None:
+        """Note that all operands of a value have times: an operator can start, and all else is evaluated."""
+        waiting = [node]
+        while waiting:
+            item = waiting.pop()
+            if is_operator(item):
+                self.ready.append(item)
+                continue
+            self.schedule.times[item.number] = self._evaluated(item)
+            waiting += self._released(item)
+
+    def _released(self, node: Node) -> Iterator[Node]:
+        """Yield the users of a value that lack no other operand."""
+        for user in self.users[node.number]:
+            self.lacking[user.number] -= 1
+            if not self.lacking[user.number]:
+                yield user
 
     def _urgency(self, nodes: Sequence[Node]) -> dict[int, float]:
         """Return the longest path from each node to the end of the phase, in steps."""
@@ -119,14 +152,11 @@ class _Builder:
                     found[item.number] = max(found[item.number], found[node.number])
         return found
 
-    def _is_ready(self, node: Node, phase: int, step: int) -> bool:
-        times = [self.time(item, phase) for item in node.operands]
-        return all(
-            time is not None and (time.step < step or (time.step == step and time.delay <= _BUDGET - _SELECTION))
-            for time in times
-        )
+    def _can_start(self, node: Node, step: int) -> bool:
+        times = [self.time(item) for item in node.operands]
+        return all(time.step < step or (time.step == step and time.delay <= _BUDGET - _SELECTION) for time in times)
 
-    def _start(self, node: Node, phase: int, step: int) -> bool:
+    def _start(self, node: Node, step: int) -> bool:
         """Issue an operation at a step if a unit is free; return whether it is issued."""
         operator = operator_of(node, self.form)
         end = step + 1 + operator.latency
@@ -140,7 +170,9 @@ class _Builder:
         if operator.has_wait:
             self.waits.append(end)
         self.schedule.issues[node.number] = Issue(node, unit, step, end)
-        self.schedule.times[node.number] = Time(phase, end)
+        self.schedule.times[node.number] = Time(self.phase, end)
+        for user in self._released(node):
+            self._enter(user)
         return True
 
     def _free_unit(self, operator: Operator, step: int) -> Unit | None:
@@ -154,21 +186,15 @@ class _Builder:
         self.schedule.units.append(unit)
         return unit
 
-    def time(self, node: Node, phase: int) -> Time | None:
-        """Return when a value can be read in a phase, or None if an operation before it has no time yet."""
-        if node.operation in LEAVES or node.phase < phase:
-            return Time(phase, 0)
-        if node.number in self.schedule.times or is_operator(node):
-            return self.schedule.times.get(node.number)
-        found = [self.time(item, phase) for item in node.operands]
-        times = [time for time in found if time is not None]
-        if len(times) < len(found):
-            return None
-        made = self._evaluated(node, phase, times)
-        self.schedule.times[node.number] = made
-        return made
+    def time(self, node: Node) -> Time:
+        """Return when a value can be read in the phase that is scheduled."""
+        if node.operation in LEAVES or node.phase < self.phase:
+            return Time(self.phase, 0)
+        return self.schedule.times[node.number]
 
-    def _evaluated(self, node: Node, phase: int, times: Sequence[Time]) -> Time:
+    def _evaluated(self, node: Node) -> Time:
+        """Return when a combinational operation is evaluated."""
+        phase, times = self.phase, [self.time(item) for item in node.operands]
         step = max(time.step for time in times)
         before = max(time.delay for time in times if time.step == step)
         if node.operation in TRANSPARENT:
@@ -185,7 +211,7 @@ class _Builder:
 
     def _length(self, phase: int, nodes: Sequence[Node]) -> int:
         """Return the number of steps of a phase: all its values are in registers at the end."""
-        ends = [time.step + 1 for node in nodes if (time := self.time(node, phase)) is not None]
+        ends = [self.time(node).step + 1 for node in nodes]
         loop = self.loops.get(phase)
         if loop is not None or phase + 1 in self.loops:
             # A loop has a step for each element, and one before for the first values.

@@ -54,7 +54,8 @@ _ANCHOR = re.compile(r"^(  \S+:) &(?:sim|live|network|emulate|synth|board)(?= )"
 class CoreOptions:
     """The options of a new `.core` that the specification does not determine; paths are relative to the core.
 
-    `bench` is the name of a bench in cocotb, which reads specification, stimuli and model.
+    Without a `model`, the functions of accelerators in Python are the model. `bench` is the name of a bench in cocotb,
+    which reads specification, stimuli and model.
     """
 
     name: str = ""
@@ -92,7 +93,7 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
     simulation = {
         "product": "simulation",
         "stimuli": options.stimuli,
-        "model": options.model,
+        **({"model": options.model} if options.model else {}),
         "environment": _paths(options.environment),
     }
     head = render(

@@ -28,7 +28,7 @@ from fusesoc_firm.system.scaffold.python_skeleton import copied_fields
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.scaffold.usual_sizes import Usual, usual_size
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
-from fusesoc_firm.system.written.specification import SOFTWARE
+from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE
 from fusesoc_firm.text.diagnostics import Diagnostic, InputError, fail, nearest
 from fusesoc_firm.text.naming import KEYWORDS, identifier
 from fusesoc_firm.text.outputs import check_parent, write
@@ -37,7 +37,8 @@ from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.library_path import LINK, link_library
 
 _SUBSCRIBER, _PUBLISHER, _FORWARDER = "sub", "pub", "pass_through"
-_ARITHMETIC = "robot:acc:firm_float"
+# The cores with the operations of accelerators, by language.
+_ARITHMETIC = {"vhdl": "robot:acc:firm_float", "verilog": "robot:acc:firm_float", "python": "robot:acc:firm_python"}
 _STIMULI = "stimuli.yaml"
 # Bytes; block RAM of a small FPGA. The author of a specification chooses the size that the messages need.
 _BUFFER = 4096
@@ -56,7 +57,8 @@ LANGUAGES = {
     "vhdl": Language("VHDL", "rtl/{}.vhd"),
     "verilog": Language("Verilog", "rtl/{}.v"),
     "hls": Language("HLS", "hls/{}.cpp"),
-    "python": Language(SOFTWARE, "software/{}.py"),
+    "python": Language(PYTHON, "python/{}.py"),
+    "software": Language(SOFTWARE, "software/{}.py"),
 }
 
 
@@ -163,8 +165,8 @@ def create(project: Project, folder: Path, known: Libraries, paths: Sequence[Pat
     if fault := name_fault(project.name):
         fail(fault)
     if project.include and LANGUAGES[project.language].type == SOFTWARE:
-        hint = "omit --include, or choose vhdl, verilog or hls"
-        fail("an accelerator in Python receives whole messages, so it cannot have --include", hint=hint)
+        hint = "omit --include, or choose vhdl, verilog, hls or python"
+        fail("an accelerator in software receives whole messages, so it cannot have --include", hint=hint)
     if project.has_bench:
         _check_bench(project, paths)
     with new_folder(folder) as inner:
@@ -228,6 +230,7 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     context = _specification(project, ros, taken, given) | {"max_length": _max_length(project, taken, known)}
     write(spec, render("project/specification.yaml", context))
     loaded = load_system(spec, known, needs_sources=False)
+    arithmetic = _ARITHMETIC.get(project.language)
     has_arithmetic = project.language in ("vhdl", "verilog")
     for path, text in missing_sources(loaded.system, folder, has_arithmetic=has_arithmetic).items():
         write(path, text)
@@ -236,7 +239,10 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
         paths = [stimuli.name, *paths]
     else:
         write(folder / _STIMULI, first_stimuli(_SUBSCRIBER, taken, project.width))
-    write(folder / "model.py", render("project/model.py", _model(project, loaded, given)))
+    # A compiled function is its own model.
+    model = "" if project.language == "python" else "model.py"
+    if model:
+        write(folder / model, render("project/model.py", _model(project, loaded, given)))
     bench = f"test_{project.name}.py" if project.has_bench else ""
     if bench:
         names = {"name": project.name, "spec": spec.name, "stimuli": _STIMULI}
@@ -245,9 +251,10 @@ def _write_all(project: Project, folder: Path, known: Libraries, paths: Sequence
     description = f"{project.input} to {project.output}"
     options = CoreOptions(
         description=description,
-        depend=[_ARITHMETIC] if has_arithmetic else (),
+        depend=[arithmetic] if arithmetic else (),
         paths=paths,
         stimuli=stimuli.name if stimuli else _STIMULI,
+        model=model,
         bench=bench,
     )
     write(core, new_core(loaded.system, spec.name, options))

@@ -21,7 +21,7 @@ from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelera
 from fusesoc_firm.system.scaffold.pass_through import Wires, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
 from fusesoc_firm.system.scaffold.stream_skeleton import STREAM_TEMPLATE, stream_function
-from fusesoc_firm.system.written.specification import SOFTWARE, Pin
+from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE, Pin
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 from fusesoc_firm.text.render import Context, render
 
@@ -83,7 +83,7 @@ def skeleton(type_: AcceleratorType, *, has_arithmetic: bool = False) -> str:
     if language := _LANGUAGES.get(type_.accelerator.type):
         template = language.template
         configuration = {**_entity(type_, language), "has_arithmetic": has_arithmetic}
-    elif type_.accelerator.type == SOFTWARE:
+    elif type_.accelerator.type in (SOFTWARE, PYTHON):
         template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
     elif is_streamed(type_):
         template, configuration = STREAM_TEMPLATE, stream_function(type_)
