@@ -8,6 +8,7 @@ of a negative number is NaN, and a conversion of NaN to an integer is 0.
 from __future__ import annotations
 
 import ast
+import copy
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
-from fusesoc_firm.message.wire import WireType
 
-_POWER = "_firm_power"
+_OPERATORS = {ast.Pow: "_firm_power", ast.Div: "_firm_quotient"}
 _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
 
@@ -63,7 +63,7 @@ def _names(part: FrameField | Data) -> tuple[str, ...]:
 
 
 def _type(part: FrameField | Data, numbers: str) -> Callable[[Any], Any]:
-    wire: WireType = part.element if isinstance(part, Data) else part.type
+    wire = part.element if isinstance(part, Data) else part.type
     if wire.name == "bool":
         # An array of variable size has bytes.
         return np.uint8 if isinstance(part, Data) else bool
@@ -86,7 +86,7 @@ def plain(frame: Frame, answer: Any) -> Any:
     return _plain(answer, (), bits)
 
 
-def _plain(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], WireType]) -> Any:
+def _plain(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], Any]) -> Any:
     if isinstance(value, Mapping):
         return {name: _plain(item, (*path, str(name)), types) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -111,26 +111,36 @@ def silent() -> Iterator[None]:
 
 
 def prepared(module: ast.Module) -> ast.Module:
-    """Return a source in which powers are calls of `power`."""
-    made: ast.Module = ast.fix_missing_locations(_Powers().visit(module))
+    """Return a source in which powers and quotients are calls of functions of this module."""
+    made: ast.Module = ast.fix_missing_locations(_Replaced().visit(module))
     return made
 
 
-class _Powers(ast.NodeTransformer):
+class _Replaced(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
-        if not isinstance(node.op, ast.Pow):
-            return node
-        call = ast.Call(ast.Name(_POWER, ast.Load()), [node.left, node.right], [])
-        return ast.copy_location(call, node)
+        return _called(node, node.op, node.left, node.right) or node
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
         self.generic_visit(node)
-        if not isinstance(node.op, ast.Pow) or not isinstance(node.target, ast.Name):
-            return node
-        before = ast.Name(node.target.id, ast.Load())
-        call = ast.Call(ast.Name(_POWER, ast.Load()), [before, node.value], [])
-        return ast.copy_location(ast.Assign([node.target], call), node)
+        before = copy.deepcopy(node.target)
+        before.ctx = ast.Load()
+        call = _called(node, node.op, before, node.value)
+        return ast.copy_location(ast.Assign([node.target], call), node) if call else node
+
+
+def _called(node: ast.AST, kind: ast.operator, left: ast.expr, right: ast.expr) -> ast.expr | None:
+    """Return the call that takes the place of an operator, or None for other operators."""
+    name = _OPERATORS.get(type(kind))
+    return ast.copy_location(ast.Call(ast.Name(name, ast.Load()), [left, right], []), node) if name else None
+
+
+def quotient(one: Any, other: Any) -> Any:
+    """Return a quotient; that by zero is infinite or NaN also for numbers of Python."""
+    try:
+        return one / other
+    except ZeroDivisionError:
+        return float(np.float64(one) / np.float64(other))
 
 
 def power(base: Any, exponent: Any) -> Any:
@@ -214,5 +224,5 @@ def adopt(module: ModuleType) -> None:
 
 
 def begin(module: ModuleType) -> None:
-    """Give a module, before it runs, the function that takes the place of `**`."""
-    setattr(module, _POWER, power)
+    """Give a module, before it runs, the functions that take the place of `**` and `/`."""
+    vars(module).update(_firm_power=power, _firm_quotient=quotient)

@@ -76,10 +76,18 @@ class Expressions(Names):
         return self.checked(node, operation, value)
 
     def _value_tuple(self, node: ast.Tuple) -> Value:
-        return tuple(self.expression(item) for item in node.elts)
+        return tuple(self._listed(node.elts))
 
     def _value_list(self, node: ast.List) -> Value:
-        return self.list_of([self.expression(item) for item in node.elts])
+        return self.list_of([*self._listed(node.elts)])
+
+    def _listed(self, items: Sequence[ast.expr]) -> Iterator[Value]:
+        """Yield the elements of a list or tuple; '*' inserts those of another one."""
+        for item in items:
+            if isinstance(item, ast.Starred):
+                yield from self.elements(self.expression(item.value), item)
+            else:
+                yield self.expression(item)
 
     def _value_subscript(self, node: ast.Subscript) -> Value:
         return self._item(self.expression(node.value), node.slice, node)

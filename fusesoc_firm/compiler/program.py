@@ -331,31 +331,35 @@ class _Run:
         for name, item in self.interpreter.memory.cells[value].items():
             if name not in known:
                 self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
-            if isinstance(item, Record):
-                self._check_names(known[name], item, f"{path}{name}.")
+            if isinstance(inner := item.value if isinstance(item, Maybe) else item, Record):
+                self._check_names(known[name], inner, f"{path}{name}.")
 
     def _fields(self, side: Side, value: Record | None) -> dict[str, list[Node]]:
         found: dict[str, list[Node]] = {}
         for leaf in side.leaves:
             defaults = _defaults(side, leaf.path)
             for element, steps in enumerate(places(leaf)):
-                given = self._at(value, steps)
-                fallback = self.graph.constant(defaults[element % len(defaults)])
-                found.setdefault(leaf.port, []).append(
-                    self._field(fallback if given is None else given, leaf.kind, steps)
-                )
+                condition, given = self._at(value, steps)
+                fallback = converted(self.graph, self.graph.constant(defaults[element % len(defaults)]), leaf.kind)
+                node = fallback if given is None else self._field(given, leaf.kind, steps)
+                found.setdefault(leaf.port, []).append(self.graph.choose(condition, node, fallback))
         return found
 
-    def _at(self, value: Value, steps: Sequence[str | int]) -> Value:
-        """Return the value at a path of an answer, or None without one."""
-        for step in steps:
+    def _at(self, value: Value, steps: Sequence[str | int]) -> tuple[Node, Value]:
+        """Return the value at a path of an answer, or None without one, and the condition that it is there."""
+        condition = self.graph.true()
+        for step in (*steps, None):
+            while isinstance(value, Maybe):
+                condition, value = self.graph.both(condition, value.condition), value.value
+            if step is None or value is None:
+                break
             if isinstance(value, tuple) and isinstance(step, int):
                 value = value[step] if step < len(value) else None
             elif isinstance(value, Record | Array):
                 value = self.interpreter.memory.cells[value].get(step)
-            elif value is not None:
+            else:
                 self._refuse(f"field '{step}' is in {described(value)}, which has no fields")
-        return value
+        return condition, value
 
     def _field(self, value: Value, kind: Kind, steps: Sequence[str | int]) -> Node:
         name = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
@@ -372,8 +376,10 @@ class _Run:
         return made
 
     def _sent(self, part: Part, value: Record) -> Sent:
-        given = self._at(value, names_of(part.path))
+        condition, given = self._at(value, names_of(part.path))
         name = dotted(names_of(part.path))
+        if not condition.is_constant and given is not None:
+            self._refuse(f"'{name}' is only in some answers", "send it always, or return None")
         match given:
             case None | "":
                 return Sent(part, None)

@@ -114,7 +114,7 @@ class Repetition(Calls):
             )
 
         def turn(loop: Loop) -> None:
-            element = self._element(over.stream, loop, node)
+            element = self._element(over.stream, loop, node.iter)
             if over.first is None:
                 self.assign(node.target, element)
             else:

@@ -177,9 +177,12 @@ class Merge:
 
     def _object(self, one: Array | Record, other: Array | Record) -> Array | Record:
         contents = self.memory.cells[one], self.memory.cells[other]
-        if contents[0].keys() != contents[1].keys():
-            raise UnmergeableError(f"{described(one)} and another one with other elements")
-        made: Array | Record = self.memory.new(type(one)(), self.names(*contents))
+        if isinstance(one, Array) and len(contents[0]) != len(contents[1]):
+            raise UnmergeableError("a list and another one with another number of elements")
+        # A field of one path alone is None on the other one.
+        keys = dict.fromkeys((*contents[0], *contents[1]))
+        merged = {key: self.value(contents[0].get(key), contents[1].get(key), str(key)) for key in keys}
+        made: Array | Record = self.memory.new(type(one)(), merged)
         return made
 
     def _maybe(self, one: Value, other: Value) -> Value:

@@ -27,7 +27,7 @@ class RandomFunction:
         for _ in range(self.source.randint(2, 6)):
             self.statement(2)
         body = "\n".join(f"        {line}" for line in self.lines)
-        return f'''import math
+        return f"""import math
 import numpy as np
 
 
@@ -55,7 +55,7 @@ class Random:
 
 
 {self.name} = Random()
-'''
+"""
 
     def statement(self, depth: int) -> None:
         """Add a statement to the body."""
@@ -66,7 +66,9 @@ class Random:
         self.lines.append("    " * (2 - depth) + line)
 
     def _assign(self, depth: int) -> None:
-        names, make = self.source.choice([(self.floats, self.float_), (self.singles, self.single), (self.integers, self.integer)])
+        names, make = self.source.choice(
+            [(self.floats, self.float_), (self.singles, self.single), (self.integers, self.integer)]
+        )
         name = f"t{len(self.floats)}_{len(self.singles)}_{len(self.integers)}_{len(self.lines)}"
         value = make(2)
         self._add(f"{name} = {value}", depth)
@@ -77,7 +79,12 @@ class Random:
         if depth == 0:
             self._assign(depth)
             return
-        targets = [(name, make) for names, make in ((self.floats, self.float_), (self.integers, self.integer)) for name in names if name[0] in "ts" and name != "self.n"]
+        targets = [
+            (name, make)
+            for names, make in ((self.floats, self.float_), (self.integers, self.integer))
+            for name in names
+            if name[0] in "ts" and name != "self.n"
+        ]
         if not targets:
             self._assign(depth)
             return
@@ -105,7 +112,10 @@ class Random:
     def _return(self, depth: int) -> None:
         if self.source.random() < 0.3:
             self._add(f"if {self.condition(1)}:", depth)
-            self._add(f"    return {self.source.choice(['None', '{{**m}}', '{{}}']).replace('{{', '{').replace('}}', '}')}", depth)
+            self._add(
+                f"    return {self.source.choice(['None', '{{**m}}', '{{}}']).replace('{{', '{').replace('}}', '}')}",
+                depth,
+            )
 
     def float_(self, depth: int) -> str:
         """Return an expression of the kind float64."""
@@ -139,17 +149,36 @@ class Random:
         one = self.single(depth - 1)
         other = self.single(depth - 1) if self.source.random() < 0.7 else self._constant("")
         forms = [f"({one} {sign} {other})" for sign in "+-*"]
-        forms += [f"abs({one})", f"max({one}, {self.single(0)})", f"np.float32({self.float_(depth - 1)})", f"({one} * 4.0 / 8.0)"]
+        forms += [
+            f"abs({one})",
+            f"max({one}, {self.single(0)})",
+            f"np.float32({self.float_(depth - 1)})",
+            f"({one} * 4.0 / 8.0)",
+        ]
         return self.source.choice(forms)
 
     def integer(self, depth: int) -> str:
         """Return an expression of the kind int32."""
         if depth == 0:
-            return self.source.choice(self.integers) if self.source.random() < 0.8 else f"np.int32({self.source.randint(-99, 99)})"
+            return (
+                self.source.choice(self.integers)
+                if self.source.random() < 0.8
+                else f"np.int32({self.source.randint(-99, 99)})"
+            )
         one, other = self.integer(depth - 1), self.integer(depth - 1)
         forms = [f"({one} {sign} {other})" for sign in "+-*&|^"]
-        forms += [f"({one} >> {self.source.randint(0, 9)})", f"({one} << {self.source.randint(0, 9)})", f"({one} // 8)", f"({one} % 16)"]
-        forms += [f"max({one}, {other})", f"({one} if {self.condition(depth - 1)} else {other})", f"(~{one})", f"np.int32(m.k + {self.source.randint(0, 3)})"]
+        forms += [
+            f"({one} >> {self.source.randint(0, 9)})",
+            f"({one} << {self.source.randint(0, 9)})",
+            f"({one} // 8)",
+            f"({one} % 16)",
+        ]
+        forms += [
+            f"max({one}, {other})",
+            f"({one} if {self.condition(depth - 1)} else {other})",
+            f"(~{one})",
+            f"np.int32(m.k + {self.source.randint(0, 3)})",
+        ]
         return self.source.choice(forms)
 
     def condition(self, depth: int) -> str:

@@ -38,6 +38,7 @@ from fusesoc_firm.system.written.specification import (
     Block,
     InterfaceType,
     OutputType,
+    Resources,
     Specification,
 )
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, nearest
@@ -47,6 +48,8 @@ from fusesoc_firm.text.yaml_sections import keys_of, keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
 Libraries = Mapping[Middleware, MessageLibrary]
+# The most operators of a kind in an accelerator.
+_MOST_OPERATORS = 16
 _KINDS_OF_BLOCKS = "a block is either an accelerator with 'type' or a converter with 'middleware', 'mode' and 'message'"
 
 
@@ -161,6 +164,7 @@ class _Resolver:
     def resolve_accelerators(self) -> None:
         for accelerator in self.specification.accelerators:
             self._check_sources(accelerator)
+            self._check_compiled(accelerator)
             inputs = self._sides("in", accelerator.interface.input)
             outputs = self._sides("out", accelerator.interface.output)
             if inputs is None or outputs is None or not accelerator.interface.is_sound or not accelerator.name:
@@ -191,10 +195,19 @@ class _Resolver:
         if accelerator.standard is not None and accelerator.type and accelerator.type != "VHDL":
             message = f"'standard' is legal only for VHDL, but '{accelerator.name}' has the type {accelerator.type}"
             self.faults.error(message, accelerator.place("standard"), "remove the key")
+
+    def _check_compiled(self, accelerator: Accelerator) -> None:
+        """Note keys of compiled functions at an accelerator in another language, and illegal numbers of operators."""
         for key in ("numbers", "resources"):
             if key in accelerator.places and accelerator.type and not accelerator.is_compiled:
                 message = f"'{key}' is legal only for Python, but '{accelerator.name}' has the type {accelerator.type}"
                 self.faults.error(message, accelerator.place(key), "remove the key")
+        if resources := accelerator.resources:
+            for name, (key, _) in keys_of(Resources).items():
+                count = getattr(resources, key)
+                if count is not None and not 1 <= count <= _MOST_OPERATORS:
+                    message = f"'{name}' of '{accelerator.name}' cannot be {count}"
+                    self.faults.error(message, resources.place(key), f"legal here: 1 to {_MOST_OPERATORS}")
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""

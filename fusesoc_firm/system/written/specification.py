@@ -300,10 +300,10 @@ class Pin(Section):
 class Resources(Section):
     """The operators of an accelerator in Python: how many operations of a kind may run at the same time."""
 
-    add: int | None = key("adders (default: 1)", form="integer")
-    multiply: int | None = key("multipliers (default: 1)", form="integer")
-    divide: int | None = key("dividers (default: 1)", form="integer")
-    square_root: int | None = key("square roots (default: 1)", form="integer")
+    add: int | None = key("adders, 1 to 16 (default: 1)", form="integer")
+    multiply: int | None = key("multipliers, 1 to 16 (default: 1)", form="integer")
+    divide: int | None = key("dividers, 1 to 16 (default: 1)", form="integer")
+    square_root: int | None = key("square roots, 1 to 16 (default: 1)", form="integer")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,145 @@
+"""Compiled functions answer as Python and NumPy do, to the bit."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from tests.compiler.compiled import Unit, differences, message_frame, random_messages, simulated
+from tests.compiler.random_functions import RandomFunction
+
+_SEED = 7
+_FUNCTIONS = {
+    "plain": """
+def plain(m):
+    return {
+        "a": m.a * 2.0 + m["b"], "b": m.a - 0.0, "c": m.c - m.d, "d": m.c / 8.0, "i": m.i + m.j, "k": m.k + 1,
+        "p": m.p and not m.q, "q": m.a < m.b, "v": [m.v[2], -m.v[1], abs(m.v[0])],
+    }
+""",
+    "control": """
+import math
+
+GAIN = 2.5
+
+
+def helper(x, y=1.0):
+    return x * y if x > y else y - x
+
+
+def control(m):
+    s = 0.0
+    for i in range(3):
+        if m.v[i] > 100.0:
+            continue
+        s = s + m.v[i] * GAIN
+    t = 0
+    for x in m.w:
+        if x < 0:
+            break
+        t = t + x
+    if m.p:
+        return None
+    return {
+        "a": s, "b": math.sqrt(abs(m.b)), "c": m.c / (m.d + 3.0), "d": helper(m.c), "i": int(m.a), "j": t,
+        "k": m.i % 16, "n": round(m.b), "q": m.i > m.n or m.j == m.k,
+        "w": [m.w[m.k & 3], m.w[0] >> 2, m.i << 1, m.j // 4],
+    }
+""",
+    "state": """
+class State:
+    def __init__(self):
+        self.total = 0.0
+        self.count = 0
+        self.past = [0.0] * 3
+
+    def __call__(self, m):
+        self.count += 1
+        if m.q:
+            return None
+        self.total += m.a
+        self.past = [m.c, self.past[0], self.past[1]]
+        return {"a": self.total, "n": self.count, "v": self.past, "c": max(self.past[2], m.d)}
+
+
+state = State()
+""",
+}
+
+
+def check(units: list[Unit], messages: int, folder: Path, seed: int) -> None:
+    sent = random_messages(random.Random(seed), messages)
+    found = simulated(units, sent, folder, seed)
+    wrong = [text for unit in units for text in differences(unit, sent, unit.expected(sent, folder), found[unit])]
+    assert not wrong, "\n".join(wrong[:3])
+
+
+@pytest.mark.check
+def test_functions_answer_as_python_does(tmp_path: Path) -> None:
+    check([Unit(name, text) for name, text in _FUNCTIONS.items()], 40, tmp_path, _SEED)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    ("functions", "messages", "seeds"),
+    [(3, 20, range(1)), pytest.param(10, 60, range(100), marks=pytest.mark.thorough)],
+)
+def test_random_functions_answer_as_python_does(functions: int, messages: int, seeds: range, tmp_path: Path) -> None:
+    for seed in seeds:
+        source = random.Random(seed)
+        units = [
+            Unit(f"f{number}", RandomFunction(source, f"f{number}").text(), limits={"add": 1 + number % 2})
+            for number in range(functions)
+        ]
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        check(units, messages, folder, seed)
+
+
+def test_an_operation_stays_as_it_is_written() -> None:
+    """A sum is not reordered, and a product with a sum is not fused; equal operations are computed once."""
+    text = "def f(m):\n    x = m.a + m.b + m.v[0]\n    y = m.b + m.a\n    return {'a': x, 'b': y * m.v[0] + x}\n"
+    nodes = [str(node) for node in Unit("f", text).program().needed() if node.operation in ("add", "multiply")]
+    assert [node.split(" = ")[1].partition("(")[0] for node in nodes] == ["add", "add", "multiply", "add"]
+
+
+@pytest.mark.parametrize(
+    ("expression", "operations"),
+    [
+        ("m.a / 8.0", ["multiply"]),
+        ("m.a / 3.0", ["divide"]),
+        ("m.a * 1.0", []),
+        ("m.a * -1.0", ["negate"]),
+        ("m.a + 0.0", ["add"]),
+        ("m.a - 0.0", ["add"]),
+        ("-(-m.a)", []),
+        ("2.0 * 3.5", []),
+    ],
+)
+def test_only_exact_identities_are_used(expression: str, operations: list[str]) -> None:
+    nodes = Unit("f", f"def f(m):\n    return {{'a': {expression}}}\n").program().needed()
+    assert [node.operation for node in nodes if node.operation not in ("constant", "input")] == operations
+
+
+def test_more_units_take_fewer_steps() -> None:
+    text = "def f(m):\n    return {'a': (m.a + m.b) * (m.a - m.b) + (m.v[0] + m.v[1]) * (m.v[1] - m.v[2])}\n"
+    one, two = (Unit("f", text, limits={"add": count, "multiply": count}).schedule() for count in (1, 2))
+    assert [sum(item.steps) for item in (one, two)] == sorted([sum(one.steps), sum(two.steps)], reverse=True)
+    assert sum(two.steps) < sum(one.steps)
+    assert len(one.units) == 2
+
+
+def test_an_index_that_nobody_reads_is_no_register() -> None:
+    frame = message_frame("float32[] ranges\nfloat64 a\n")
+    text = """
+def f(m):
+    best = 9.0
+    for i, r in enumerate(m.ranges):
+        best = min(best, VALUE)
+    return {"a": best}
+"""
+    for value, count in (("r", 1), ("r + i", 2)):
+        (loop,) = Unit("f", text.replace("VALUE", value)).program(frame).loops
+        assert len(loop.carried) == count

@@ -1,0 +1,135 @@
+"""What is not hardware is refused with its place and a remedy."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from fusesoc_firm.compiler.interface import side_of
+from fusesoc_firm.compiler.program import Task, compile_function
+from fusesoc_firm.compiler.source import Source
+from fusesoc_firm.text.diagnostics import InputError
+from tests.compiler.compiled import message_frame
+
+SCAN = message_frame("float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n")
+ANSWER = message_frame("float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nstring name\n")
+
+# The body of a function of the message `m`, with '@' before the place of the fault; the message, and the remedy.
+BODIES = [
+    ("@while m.n > 0:\n    pass", "'while' has no known number of turns", "range.N"),
+    ("@try:\n    x = 1\nexcept ValueError:\n    x = 2", "exceptions are not hardware", "'if'"),
+    ("@raise ValueError", "exceptions are not hardware", "return None"),
+    ("@assert m.n > 0", "'assert' is not hardware", "return None"),
+    ("@with open('x') as f:\n    pass", "'with' is not hardware", "remove it"),
+    ("@global count\ncount = 1", "cannot change a global name", "self"),
+    ("@del m.n", "'del' is not hardware", "fixed size"),
+    ("@import math", "an import within a function", "top of the file"),
+    ("@class A:\n    pass", "a class within a function", "top of the file"),
+    ("@def inner():\n    return 1", "a function within a function", "top of the file"),
+    ("@match m.n:\n    case 1:\n        pass", "'match' is not hardware", "'elif'"),
+    ("@yield 1", "a generator is not hardware", "append"),
+    ("x = @{1, 2}", "a set is not hardware", "list"),
+    ("x = @{i: i for i in range(2)}", "a dictionary of computed keys", "name the fields"),
+    ("x = @f'{m.n}'", "a text cannot be computed", "pass a text"),
+    ("if (@x := m.n) > 1:\n    pass", "':=' is not hardware", "line of its own"),
+    ("x = max(@*m.v)", "'*' is not hardware here", "name the elements"),
+    ("x = @m.v @ m.v", "a list is not a number", ""),
+    ("x = @m.n / 'a'", "a text is not a number", ""),
+    ("x = @m.n % 3", "constants that are powers of two", "division of floats"),
+    ("x = @m.n // m.n", "constants that are powers of two", "division of floats"),
+    ("x = @m.low % 2.0", "'//' and '%' of floats", "math.floor"),
+    ("x = @m.low ** m.low", "the exponent of '**' must be a constant", "product"),
+    ("x = @m.low ** 0.3", "'** 0.3' is not hardware", "legal exponents"),
+    ("x = @m.n << m.n", "the number of bits of a shift must be a constant", "range"),
+    ("x = @~m.p", "'~' of a bool", "'not'"),
+    ("x = @-m.p", "a truth value has no negative", "'not'"),
+    ("x = @m.p + m.p", "a truth value is not a number here", "int()"),
+    ("x = @m.low & 1", "there is no such operation on a float32 and a int", "int()"),
+    ("x = @m.n + 3000000000", "out of the range of int32", "NumPy"),
+    ("x = @math.gamma(m.low)", "'math.gamma' is not hardware", "legal here: ceil"),
+    ("x = @math.sqrt(m.low, 2)", "'math.sqrt' takes 1 numbers", ""),
+    ("x = @print(m.n)", "'print' is not hardware", ""),
+    ("x = @missing + 1", "the name 'missing' has no value", ""),
+    ("x = @m.lwo", "the message has no field 'lwo'", "did you mean 'low'"),
+    ("x = m[@'lwo']", "the message has no field 'lwo'", "did you mean 'low'"),
+    ("x = @m.ranges[2]", "an array of variable size is not stored", "loop over the array"),
+    ("for a, b in zip(@m.ranges, m.heights):\n    pass", "an array of variable size is read once", "loop over"),
+    ("for r in m.ranges:\n    pass\n@for r in m.ranges:\n    pass", "'ranges' is read twice", "one loop"),
+    ("if m.p:\n    @for r in m.ranges:\n        pass", "a loop over an array within 'if'", "'if' into the loop"),
+    ("for r in m.ranges:\n    @for h in m.heights:\n        pass", "a loop over an array within another one", ""),
+    ("for r in m.ranges:\n    if r > 1.0:\n        @break", "'break' in a loop over an array", "'if'"),
+    ("for r in m.ranges:\n    if r > 1.0:\n        @return None", "'return' within a loop over an array", "set a name"),
+    ("for c in @m.name:\n    pass", "'name' can only be passed on", "array of numbers"),
+    ("for i in range(@m.n):\n    pass", "the number of turns is not a constant", "constant limit"),
+    ("for i in range(2):\n    pass\nelse:\n    @pass", "'else' after a loop", "'break'"),
+    ("for i in @range(5000):\n    pass", "a loop of 5000 turns is too long", "at most 4096"),
+    ("if m.p:\n    x = 1\ny = @x + 1", "'x' has no value on one of the paths", "before the 'if'"),
+    ("@if m.p:\n    x = 1\nelse:\n    x = (1, 2)", "two paths leave a int and a tuple of 2", "same type"),
+    ("x = @'a' < 'b'", "a text cannot be compared", ""),
+    ("x = @m.n is m.n", "'is' is not hardware", "'=='"),
+    ("x = m.v[@7]", "7 is not an index of 4 elements", ""),
+    ("x = m.v[@m.low]", "an index must be an integer", "int()"),
+    ("x = @(lambda y: y)(1, 2)", "'lambda' has no parameter", ""),
+    ("x = @helper()", "'helper' needs a value for 'y'", ""),
+    ("x = @1j", "is not a number of hardware", "64 bits"),
+    ("x = @m.items()", "'items' of a message is not hardware", "name the fields"),
+]
+RETURNS = [
+    ("return @1", "the function returns a int, not a message", "'field'"),
+    ("return {'y': 1}", "the answer has no field 'y'", ""),
+    ("return {'i': m.low}", "'i' is an integer \\(int32\\), and the answer is a float32", "round\\(\\)"),
+    ("return {'ranges': [m.low]}", "'ranges' is a list", "append"),
+    ("return {'name': 'a'}", "'name' is a text", "pass one"),
+]
+_HEAD = """import math
+
+
+def helper(y):
+    return y
+
+
+def again(y):
+    return again(y)
+
+
+def tried(m):
+"""
+
+
+def compiled(body: str) -> None:
+    text = _HEAD + "".join(f"    {line}\n" for line in body.split("\n"))
+    compile_function(Task(Source("tried.py", text), "tried", [side_of("in_", SCAN)], [side_of("out_", ANSWER)]))
+
+
+@pytest.mark.parametrize(("body", "message", "remedy"), BODIES)
+def test_a_construct_is_refused_at_its_place(body: str, message: str, remedy: str) -> None:
+    mark = body.index("@")
+    text = body[:mark] + body[mark + 1 :]
+    with pytest.raises(InputError) as raised:
+        compiled(f"{text}\nreturn {{}}")
+    (fault,) = raised.value.diagnostics
+    assert message in fault.message
+    assert re.search(remedy, fault.hint), fault.hint
+    assert fault.source is not None
+    lines = body[:mark].split("\n")
+    head = _HEAD.count("\n")
+    assert (fault.source.line, fault.source.column) == (head + len(lines), 5 + len(lines[-1]))
+
+
+@pytest.mark.parametrize(("body", "message", "remedy"), RETURNS)
+def test_an_answer_is_refused(body: str, message: str, remedy: str) -> None:
+    with pytest.raises(InputError) as raised:
+        compiled(body.replace("@", ""))
+    (fault,) = raised.value.diagnostics
+    assert re.search(message, fault.message), fault.message
+    assert re.search(remedy, fault.hint), fault.hint
+
+
+def test_a_recursion_is_refused_at_its_call() -> None:
+    with pytest.raises(InputError, match=r"tried\.py:9:12: error: a recursion is not hardware"):
+        compiled("x = again(1)\nreturn {}")
+
+
+def test_more_than_forty_constructs_are_refused() -> None:
+    assert len(BODIES) + len(RETURNS) >= 60
