@@ -30,7 +30,7 @@ ALLOWED: dict[str, str] = {
     "system": "compiler converter core frame message scheduling text tools",
     "cocotb": "converter frame message system",
     "fabric": "message system text tools",
-    "accelerator": "converter frame netlist system text tools",
+    "accelerator": "compiler converter frame netlist system text tools",
     "node": "accelerator core frame message system text tools",
     "runs": "accelerator converter core frame message node system text tools",
     "builds": "converter core fabric message node runs system text tools",

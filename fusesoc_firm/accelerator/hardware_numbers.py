@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64
+from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
 _OPERATORS = {ast.Pow: "_firm_power", ast.Div: "_firm_quotient"}
@@ -195,6 +197,30 @@ def _hypotenuse(*values: Any) -> Any:
     return square_root(total)
 
 
+def _modelled(name: str) -> Callable[..., Any]:
+    """Return a function whose results are those of its model, in float32 or float64."""
+
+    def run(*values: Any) -> Any:
+        is_single = all(isinstance(value, np.float32) for value in values)
+        result = modelled(name, FLOAT32 if is_single else FLOAT64, *values)
+        if is_single:
+            return np.float32(result)
+        return np.float64(result) if any(isinstance(value, np.float64) for value in values) else result
+
+    return run
+
+
+def _angle(y: Any, x: Any) -> Any:
+    # A number of Python adopts the other one's type.
+    if isinstance(y, np.float32) or isinstance(x, np.float32):
+        y, x = (np.float32(value) if isinstance(value, int | float) else value for value in (y, x))
+    return _modelled("atan2")(y, x)
+
+
+def _other_leg(value: Any) -> Any:
+    return square_root((1.0 - value) * (1.0 + value))
+
+
 _MATH: Mapping[str, Callable[..., Any]] = {
     "sqrt": square_root,
     "fabs": lambda value: _real(np.fabs, value),
@@ -203,6 +229,12 @@ _MATH: Mapping[str, Callable[..., Any]] = {
     "ceil": lambda value: -_floor(-value),
     "trunc": lambda value: _whole(value, math.trunc),
     "hypot": _hypotenuse,
+    "atan2": _angle,
+    "atan": lambda value: _angle(value, 1.0),
+    "asin": lambda value: _angle(value, _other_leg(value)),
+    "acos": lambda value: _angle(_other_leg(value), value),
+    "exp": _modelled("exp"),
+    "log": _modelled("log"),
 }
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
     "int": lambda value=0: _whole(value, int) if isinstance(value, float | np.floating) else int(value),

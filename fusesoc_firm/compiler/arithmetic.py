@@ -17,6 +17,7 @@ import numpy as np
 
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import BOOL, FLOAT, FLOAT32, FLOAT64, INT, INTEGERS, Kind, number_of, result_kind
+from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.compiler.values import UnmergeableError, common_kind, converted
 
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -332,6 +333,37 @@ class Arithmetic:
         one, other = self.real(value), self.real(sign)
         kind = self._result(operator.add, one, other)
         return self.graph.node("copy_sign", (self._to(one, kind), self._to(other, kind)), kind)
+
+    def function(self, name: str, *values: Node) -> Node:
+        """Return a function that has a model, such as `atan2`."""
+        operands = [self.real(value) for value in values]
+        kind = operands[0].kind
+        for item in operands[1:]:
+            kind = common_kind(kind, item.kind)
+        operands = [self._to(item, kind) for item in operands]
+        if all(item.is_constant for item in operands):
+            return self.graph.constant(number_of(kind, modelled(name, kind, *(item.payload for item in operands))))
+        return self.graph.node(name, operands, kind)
+
+    def angle(self, value: Node) -> Node:
+        """Return `math.atan(value)`."""
+        return self.function("atan2", value, self.graph.constant(1.0))
+
+    def arc_sine(self, value: Node) -> Node:
+        """Return `math.asin(value)`, as the angle of a vector."""
+        number = self.real(value)
+        return self.function("atan2", number, self._other_leg(number))
+
+    def arc_cosine(self, value: Node) -> Node:
+        """Return `math.acos(value)`, as the angle of a vector."""
+        number = self.real(value)
+        return self.function("atan2", self._other_leg(number), number)
+
+    def _other_leg(self, value: Node) -> Node:
+        """Return the square root of (1 - value) * (1 + value)."""
+        one = self.graph.constant(1.0)
+        product = self.binary(ast.Mult, self.binary(ast.Sub, one, value), self.binary(ast.Add, one, value))
+        return self.square_root(product)
 
     def truncated(self, value: Node) -> Node:
         """Return `int(value)`; beyond 64 bits, hardware has the nearest integer of 64 bits, and 0 for NaN."""

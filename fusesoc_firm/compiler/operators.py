@@ -12,6 +12,7 @@ import yaml
 
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import Kind
+from fusesoc_firm.compiler.models import MODELLED
 from fusesoc_firm.tools.library_path import library_root
 
 # The operations of the graph that are operators, each with the operator's name.
@@ -23,17 +24,20 @@ _NAMES = {
     "to_float": "from_fixed",
     "to_integer": "to_fixed",
     "resize": "resize",
+    **{name: name for name in MODELLED},
 }
 # The widths of integers that are converted; one operator converts all that are not wider.
 _WIDTHS = (32, 64, 65)
+SHORT = "short"
+"""The form of operators with few registers."""
 
 
 @dataclass(frozen=True)
 class Operator:
     """An entity that computes one operation: the generics, the ports of the operands, and the port of the result.
 
-    The result is there `latency` cycles after its operands, or later if `has_wait` is set; `width` is its bits, and
-    `operand` those of its operands.
+    The result is there `latency` cycles after its operands. With `has_wait`, one result is computed at a time, and it
+    may be later. `width` is the bits of the result, and `operand` those of the operands.
     """
 
     operation: str
@@ -68,7 +72,7 @@ def is_operator(node: Node) -> bool:
     return node.operation in _NAMES
 
 
-def operator_of(node: Node, form: str = "default") -> Operator:
+def operator_of(node: Node, form: str = SHORT) -> Operator:
     """Return the operator that computes a node; `form` is preferred, if the operator has it."""
     of_operand = node.operation in ("to_integer", "resize")
     size = node.operands[0].kind if of_operand else node.kind
@@ -83,11 +87,11 @@ def operator_of(node: Node, form: str = "default") -> Operator:
     return Operator(
         node.operation,
         description["entity"],
-        (*((name, str(value)) for name, value in facts["generics"].items()), *generics),
+        (*((name, str(value).lower()) for name, value in facts["generics"].items()), *generics),
         ports,
         next(iter(description["outputs"])),
         latency,
-        "longest" in facts,
+        facts["interval"] != 1,
         width if node.operation == "to_integer" else node.kind.bits,
         width if node.operation == "to_float" else size.bits,
         facts["lut"],

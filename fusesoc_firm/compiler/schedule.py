@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.kinds import BOOL
-from fusesoc_firm.compiler.operators import Operator, is_operator, operator_of
+from fusesoc_firm.compiler.operators import SHORT, Operator, is_operator, operator_of
 from fusesoc_firm.compiler.program import Program
 
 # Operations that are part of the reader's expression: wires, or one inverter a bit.
@@ -74,7 +74,7 @@ class Schedule:
         return found
 
 
-def scheduled(program: Program, limits: Mapping[str, int] | None = None, form: str = "default") -> Schedule:
+def scheduled(program: Program, limits: Mapping[str, int] | None = None, form: str = SHORT) -> Schedule:
     """Return the schedule of a program with at most `limits` units of an operation (default: 1)."""
     nodes = program.needed()
     last = max((2 * part.number + 2 for side in program.inputs for part in side.parts), default=0)

@@ -45,7 +45,7 @@ def _check_messages(type_: AcceleratorType, sides: Sequence[Side]) -> None:
 
 def compiler_files() -> list[Path]:
     """Return the files, beside the source, that determine the entity."""
-    return [table_file()]
+    return [table_file(), table_file().with_name("model.py")]
 
 
 def schedule_of(type_: AcceleratorType, folder: Path) -> Schedule:
