@@ -83,7 +83,6 @@ class Side:
     leaves: tuple[Leaf, ...]
     parts: tuple[Part, ...]
     segments: int
-    unsupported: tuple[str, ...] = ()
 
     @property
     def is_fixed(self) -> bool:
@@ -99,7 +98,6 @@ def side_of(prefix: str, frame: Frame) -> Side:
     segments = segments_of(frame)
     found: list[Leaf] = []
     parts: list[Part] = []
-    unsupported: list[str] = []
     for item in message_side(frame).parts:
         match item:
             case FieldPort():
@@ -107,8 +105,8 @@ def side_of(prefix: str, frame: Frame) -> Side:
             case StreamPorts():
                 parts.append(_part(prefix, item, segments.parts[item.part.path], len(parts)))
             case ElementPorts():
-                unsupported.append(dotted(item.loop.names))
-    return Side(prefix, frame, tuple(found), tuple(parts), segments.count, tuple(unsupported))
+                raise AssertionError("the accelerator has passed check_streams")
+    return Side(prefix, frame, tuple(found), tuple(parts), segments.count)
 
 
 def _leaf(prefix: str, port: FieldPort, segment: int) -> Leaf:

@@ -204,22 +204,24 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
         lacking = "output" if accelerator.inputs else "input"
         message = f"'{name}' has the type HLS, which needs at least one input and one output"
         faults.error(message, name.source, f"the accelerator's interface has no '{lacking}'")
-    _check_messages(accelerator, faults)
+    check_streams(accelerator, faults)
 
 
-def _check_messages(accelerator: AcceleratorType, faults: Diagnostics) -> None:
-    """Note messages that streams cannot carry, and further inputs of variable size."""
+def check_streams(accelerator: AcceleratorType, faults: Diagnostics) -> None:
+    """Note messages of a function in C++ or Python that streams cannot carry, and further inputs of variable size."""
     interface = accelerator.accelerator.interface
     name = accelerator.accelerator.name
     sides = (*accelerator.inputs, *accelerator.outputs)
     for side, item in zip(sides, (*interface.input, *interface.output), strict=True):
         for problem in stream_problems(side.frame):
-            message = f"'{name}' has the type HLS, which supports only {problem}"
+            message = f"'{name}' has the type {accelerator.accelerator.type}, which supports only {problem}"
             hint = "write this accelerator in VHDL, or take messages without arrays of messages or strings"
             faults.error(message, item.message.source, hint)
     varying = [number for number, side in enumerate(accelerator.inputs) if not side.frame.is_fixed_size]
     for number in varying[1:]:
-        message = f"'{name}' has the type HLS, which supports only one input of variable size"
+        message = (
+            f"'{name}' has the type {accelerator.accelerator.type}, which supports only one input of variable size"
+        )
         faults.error(message, interface.input[number].message.source, "write this accelerator in VHDL")
 
 

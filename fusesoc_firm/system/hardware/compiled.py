@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from fusesoc_firm.compiler.binding import bound
-from fusesoc_firm.compiler.interface import Side, side_of
+from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import KINDS
 from fusesoc_firm.compiler.operators import table_file
 from fusesoc_firm.compiler.program import Program, Task, compile_function
@@ -17,7 +16,6 @@ from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, shown_path
 from fusesoc_firm.system.hardware.instances import declarations
 from fusesoc_firm.system.written.specification import Resources
-from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Rendering
 from fusesoc_firm.text.yaml_sections import keys_of
 
@@ -26,21 +24,6 @@ def compiled(type_: AcceleratorType, folder: Path) -> Rendering:
     """Return the template and configuration of the entity. Raise `InputError` for a function that is not hardware."""
     writer = Writer(bound(schedule_of(type_, folder)))
     return Rendering(TEMPLATE, writer.configuration(type_.entity, declarations(type_), type_.width))
-
-
-def _check_messages(type_: AcceleratorType, sides: Sequence[Side]) -> None:
-    """Raise `InputError` for a message that a compiled function cannot have."""
-    interface = type_.accelerator.interface
-    places = [item.message.source for item in (*interface.input, *interface.output)]
-    hint = "write this accelerator in VHDL, or choose another message"
-    for side, place in zip(sides, places, strict=True):
-        for name in side.unsupported:
-            message = f"'{name}' of {side.frame.message} is an array of messages or strings, which Python cannot have"
-            fail(message, place, hint)
-    inputs = zip(sides[: len(type_.inputs)], places, strict=False)
-    varying = [place for side, place in inputs if not side.is_fixed]
-    if len(varying) > 1:
-        fail(f"'{type_.accelerator.name}' has several inputs of variable size; Python can have one", varying[1], hint)
 
 
 def compiler_files() -> list[Path]:
@@ -62,5 +45,4 @@ def program_of(type_: AcceleratorType, folder: Path) -> Program:
     text = (folder / path).read_text(encoding="utf-8", errors="replace")
     numbers = KINDS[str(type_.accelerator.numbers)] if type_.accelerator.numbers else None
     inputs, outputs = ([side_of(side.prefix, side.frame) for side in sides] for sides in (type_.inputs, type_.outputs))
-    _check_messages(type_, [*inputs, *outputs])
     return compile_function(Task(Source(shown_path(path), text), function_name(type_), inputs, outputs, numbers))
