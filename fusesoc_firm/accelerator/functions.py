@@ -17,7 +17,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed, with_attributes
+from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed
+from fusesoc_firm.accelerator.message import with_attributes
 from fusesoc_firm.accelerator.user_code import UserFunction, load_compiled, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_answer

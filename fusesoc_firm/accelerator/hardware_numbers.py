@@ -17,32 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from fusesoc_firm.accelerator.message import Message
 from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
 _OPERATORS = {ast.Pow: "_firm_power", ast.Div: "_firm_quotient"}
 _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
-
-
-class Message(dict[str, Any]):
-    """A message as a dictionary whose fields are also attributes."""
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"the message has no field '{name}'", name=name, obj=self) from None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        self[name] = value
-
-
-def with_attributes(value: Any) -> Any:
-    """Return a copy of a message in which the fields are also attributes, at all levels."""
-    if isinstance(value, Mapping):
-        return Message({name: with_attributes(item) for name, item in value.items()})
-    return [with_attributes(item) for item in value] if isinstance(value, list) else value
 
 
 def typed(frame: Frame, message: Mapping[str, Any], numbers: str = "") -> Message:

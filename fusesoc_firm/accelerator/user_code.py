@@ -154,7 +154,7 @@ def _cure(error: BaseException, fields: Sequence[str]) -> str:
                 return ""
             return f"write 'import {module}{f' as {name}' if name != module else ''}' at the top of the file"
         case AttributeError(name=str(name), obj=dict()):
-            return f'a message is a dict: write message["{name}"]'
+            return nearest(name, fields)
         case KeyError(args=[str(key)]) if fields:
             return nearest(key, fields)
         case ModuleNotFoundError(name=str(name)):

@@ -88,7 +88,7 @@ class _Answers:
         if not takes(self.function.args, len(PARAMETERS)):
             own = f"{NAME}({ast.unparse(self.function.args)})"
             self._note(f"'{NAME}' is called as '{_FORM}', but is defined as '{own}'", self.function)
-        for node, message, cure in body_faults(self.function, self.function.args.args[1:], has_result=True):
+        for node, message, cure in body_faults(self.function, has_result=True):
             self._note(message, node, ANSWER if node is self.function else cure)
         for value in self._values():
             self._check_value(value)

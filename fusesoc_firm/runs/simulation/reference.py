@@ -10,11 +10,11 @@ be omitted, as in stimuli. Calls are in the order of the stimuli, and the functi
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.accelerator.message import with_attributes
 from fusesoc_firm.accelerator.user_code import UserFunction, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_answer
@@ -77,7 +77,7 @@ class _Model:
         """Return the result of `respond` as a list."""
         with self.respond.guarded(when, [stimulus.message]):
             # A copy, because reports show the original message.
-            answer: object = self.respond.call(stimulus.subscriber.block, deepcopy(stimulus.message))
+            answer: object = self.respond.call(stimulus.subscriber.block, with_attributes(stimulus.message))
             # If `respond` is a generator, the user's code runs only here.
             items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
         if items is None:

@@ -71,24 +71,18 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         message = f"'{found.name}' cannot be called with {count} message{'' if count == 1 else 's'}"
         faults.error(message, file.place(found.lineno, found.col_offset + 1), hint)
     elif isinstance(found, ast.FunctionDef):
-        for node, message, cure in body_faults(found, found.args.args, has_result=bool(type_.outputs)):
+        for node, message, cure in body_faults(found, has_result=bool(type_.outputs)):
             faults.error(message, file.place(node.lineno, node.col_offset + 1), cure)
 
 
-def body_faults(
-    function: ast.FunctionDef, messages: Sequence[ast.arg], *, has_result: bool
-) -> Iterator[tuple[ast.FunctionDef | ast.Attribute, str, str]]:
-    """Yield the faults in a function's body, each with its node and its cure: no result, and fields as attributes.
+def body_faults(function: ast.FunctionDef, *, has_result: bool) -> Iterator[tuple[ast.FunctionDef, str, str]]:
+    """Yield the faults in a function's body, each with its node and its cure.
 
-    `messages` are the parameters whose values are messages. A function that only raises an exception is unfinished.
+    A function that only raises an exception is unfinished.
     """
-    names, inside = {item.arg for item in messages}, [*ast.walk(function)]
-    if has_result and not any(isinstance(node, ast.Return | ast.Yield | ast.YieldFrom | ast.Raise) for node in inside):
+    is_ended = any(isinstance(node, ast.Return | ast.Yield | ast.YieldFrom | ast.Raise) for node in ast.walk(function))
+    if has_result and not is_ended:
         yield function, f"'{function.name}' returns nothing", "end it with 'return answer', where answer is a message"
-    for node in inside:
-        match node:
-            case ast.Attribute(value=ast.Name(id=name), attr=field) if name in names and not hasattr(dict, field):
-                yield node, f"a message has no attribute '{field}'", f'a message is a dict: write {name}["{field}"]'
 
 
 def shown_path(source: Text) -> str:

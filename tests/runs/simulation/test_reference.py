@@ -83,7 +83,7 @@ def test_a_model_may_keep_state_and_change_what_it_gets(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "hint"),
     [
-        ("m.x", 'a message is a dict: write message["x"]'),
+        ("m.xx", "did you mean 'x'?"),
         ("m['xx']", "did you mean 'x'?"),
         ("np.cos(m['x'])", "write 'import numpy as np' at the top of the file"),
         ("math.cos(m['x'])", "write 'import math' at the top of the file"),
