@@ -48,7 +48,8 @@ def test_a_project_passes(project: Path) -> None:
 @pytest.mark.parametrize(
     ("language", "lines"),
     [
-        ("python", ["edit: turn/software/turn.py (the computation)", "next: cd turn && firm sim"]),
+        ("python", ["edit: turn/python/turn.py (the computation)", "next: cd turn && firm sim"]),
+        ("software", ["edit: turn/software/turn.py (the computation)", "next: cd turn && firm sim"]),
         ("hls", ["hardware: AMD Vitis HLS builds the function; 'firm sim' needs only g++ and GHDL"]),
     ],
 )
