@@ -221,7 +221,7 @@ def test_vhdl(project: Project, tmp_path: Path) -> None:
 SANDBOX = """\
 # A script without commands but those of the language: each call of another one is printed, and gives 1.
 interp create -safe box
-foreach name {file source exec open} { catch {interp eval box [list rename $name {}]} }
+foreach name {file source exec open puts error} { catch {interp eval box [list rename $name {}]} }
 interp alias box unknown {} called
 proc called args { puts $args; return 1 }
 fconfigure stdin -encoding utf-8
@@ -247,10 +247,10 @@ def tcl_calls(script: bytes, folder: Path) -> list[str]:
 
 @pytest.mark.skipif(not shutil.which("tclsh"), reason="tclsh is not installed")
 def test_tcl(project: Project, tmp_path: Path) -> None:
-    """The block design and constraints for Vivado, the script for Vitis HLS, and the constraints for Quartus."""
+    """The block design, the constraints and the checks for Vivado, and the script for Vitis HLS."""
     files = project.generated(spec=project.ros_1.name, board="vivado.yaml")
     scripts = {name: data for name, data in files.items() if name.endswith((".tcl", ".xdc"))}
-    assert {name.rpartition(".")[2] for name in scripts} == {"tcl", "xdc"} and len(scripts) == 3
+    assert {name.rpartition(".")[2] for name in scripts} == {"tcl", "xdc"} and len(scripts) == 4
     calls = {name: tcl_calls(data, tmp_path) for name, data in scripts.items()}
     assert "set_part xc7z020clg400-1" in calls["gain.tcl"]
     assert any(

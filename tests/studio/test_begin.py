@@ -30,7 +30,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
 def test_it_is_what_the_command_writes(studio: Studio, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert ask(studio, "GET", "api/outline")[2] is None
     choices = ask(studio, "GET", "api/choices")[2]
-    assert choices["languages"] == ["vhdl", "verilog", "hls", "python"]
+    assert choices["languages"] == ["vhdl", "verilog", "hls", "python", "software"]
     assert ask(studio, "GET", "api/types?ros=1&query=imu")[2] == {"messages": ["sensor_msgs/Imu"]}
     answer = {"language": "verilog", "width": 32, "ros": 2}
     assert ask(studio, "POST", "api/init", FORM | answer)[2] == {"file": "tilt/tilt.yaml"}

@@ -9,22 +9,25 @@ import pytest
 from fusesoc_firm.system.system_core import artifacts, load_system
 from tests.system.systems import LIBRARIES, converter, specification
 
-JOINTS, ODOMETRY = "sensor_msgs/JointState", "nav_msgs/Odometry"
+SCAN, JOINTS, ODOMETRY = "sensor_msgs/LaserScan", "sensor_msgs/JointState", "nav_msgs/Odometry"
 NONE, BORDERS, FULL = (False, False), (True, False), (True, True)
 
 
 @pytest.mark.parametrize(
     ("project", "message", "stages"),
     [
-        ("width: 64", JOINTS, NONE),
-        ("width: 64, clock: 100 MHz", JOINTS, NONE),
-        ("width: 64, clock: 101 MHz", JOINTS, FULL),
-        ("width: 8, clock: 100 MHz", JOINTS, NONE),
-        ("width: 8, clock: 101 MHz", JOINTS, BORDERS),
-        ("width: 16, clock: 101 MHz", JOINTS, FULL),
-        ("width: 64, clock: 200 MHz, pipeline: none", JOINTS, NONE),
-        ("width: 64, pipeline: borders", JOINTS, BORDERS),
-        ("width: 64, pipeline: full", JOINTS, FULL),
+        ("width: 64", SCAN, NONE),
+        ("width: 64, clock: 100 MHz", SCAN, NONE),
+        ("width: 64, clock: 101 MHz", SCAN, FULL),
+        ("width: 8, clock: 100 MHz", SCAN, NONE),
+        ("width: 8, clock: 101 MHz", SCAN, BORDERS),
+        ("width: 16, clock: 101 MHz", SCAN, FULL),
+        ("width: 64, clock: 200 MHz, pipeline: none", SCAN, NONE),
+        ("width: 64, pipeline: borders", SCAN, BORDERS),
+        ("width: 64, pipeline: full", SCAN, FULL),
+        # The queue of a message with an array of strings is such a register.
+        ("width: 64, pipeline: borders", JOINTS, NONE),
+        ("width: 64, pipeline: full", JOINTS, (False, True)),
         ("width: 64", ODOMETRY, FULL),
         ("width: 8, clock: 200 MHz", ODOMETRY, FULL),
         ("width: 64, pipeline: none", ODOMETRY, NONE),

@@ -78,8 +78,10 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
 def body_faults(function: ast.FunctionDef, *, has_result: bool) -> Iterator[tuple[ast.FunctionDef, str, str]]:
     """Yield the faults in a function's body, each with its node and its cure.
 
-    A function that only raises an exception is unfinished.
+    A function that only raises an exception, or is only '...', is unfinished.
     """
+    if all(isinstance(item, ast.Expr) and isinstance(item.value, ast.Constant) for item in function.body):
+        return
     is_ended = any(isinstance(node, ast.Return | ast.Yield | ast.YieldFrom | ast.Raise) for node in ast.walk(function))
     if has_result and not is_ended:
         yield function, f"'{function.name}' returns nothing", "end it with 'return answer', where answer is a message"
