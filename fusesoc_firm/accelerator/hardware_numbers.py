@@ -205,7 +205,7 @@ def _other_leg(value: Any) -> Any:
 _MATH: Mapping[str, Callable[..., Any]] = {
     "sqrt": square_root,
     "fabs": lambda value: _real(np.fabs, value),
-    "copysign": lambda value, sign: _real(np.copysign, value, sign),
+    "copysign": lambda value, sign: _real(np.copysign, value, type(sign)(1) if math.isnan(sign) else sign),
     "floor": _floor,
     "ceil": lambda value: -_floor(-value),
     "trunc": lambda value: _whole(value, math.trunc),

@@ -96,7 +96,8 @@ _FOLDED: dict[str, Callable[..., Any]] = {
     "equal": operator.eq,
     "negate": operator.neg,
     "absolute": abs,
-    "copy_sign": np.copysign,
+    # The sign of NaN is positive.
+    "copy_sign": lambda value, sign: np.copysign(value, 1.0 if np.isnan(sign) else sign),
     "choose": lambda condition, one, other: one if condition else other,
     "and": operator.and_,
     "or": operator.or_,

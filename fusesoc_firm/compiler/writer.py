@@ -125,7 +125,7 @@ class Writer:
             case "absolute":
                 return f"magnitude({given[0]})"
             case "copy_sign":
-                return f"with_sign_of({given[0]}, {given[1]})"
+                return f"with_sign_of({given[0]}, {given[1]}, {node.kind.exponent_bits})"
             case "invert" if node.kind == BOOL:
                 return f"(not {given[0]})"
             case "invert":
@@ -364,7 +364,10 @@ class Writer:
                 assert carried.next is not None
                 if carried.next is not carried.value:
                     load(phase, self.schedule.steps[phase] - 1, target, carried.next, carried.value.bits)
-        return [{"step": step, "lines": _commented(lines)} for step, lines in sorted(found.items())]
+        held = {item["step"] for item in self._holds()}
+        return [
+            {"step": step, "is_held": step in held, "lines": _commented(lines)} for step, lines in sorted(found.items())
+        ]
 
     def _operand(self, issue: Issue, operand: Node) -> str:
         """Return an operand of a unit; an integer has the unit's width."""

@@ -45,6 +45,7 @@ def control(m):
     return {
         "a": s, "b": math.sqrt(abs(m.b)), "c": m.c / (m.d + 3.0), "d": helper(m.c), "i": int(m.a), "j": t,
         "k": m.i % 16, "n": round(m.b), "q": m.i > m.n or m.j == m.k,
+        "v": [math.copysign(m.a, m.v[1] - m.v[1]), math.copysign(m.v[2], -m.a), 0.0],
         "w": [m.w[m.k & 3], m.w[0] >> 2, m.i << 1, m.j // 4],
     }
 """,

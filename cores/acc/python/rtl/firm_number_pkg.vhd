@@ -27,7 +27,8 @@ package firm_number_pkg is
   -- Floating-point numbers: the sign is the highest bit, and EXPONENT_BITS follow.
   function negated(number : std_logic_vector) return std_logic_vector;
   function magnitude(number : std_logic_vector) return std_logic_vector;
-  function with_sign_of(number, other : std_logic_vector) return std_logic_vector;
+  -- The sign of NaN is positive, whatever its bits.
+  function with_sign_of(number, other : std_logic_vector; exponent_bits : positive) return std_logic_vector;
   function is_nan(number : std_logic_vector; exponent_bits : positive) return boolean;
 
   -- Comparisons of IEEE 754: zeros are equal, and NaN is neither less than any number nor equal to one.
@@ -109,11 +110,11 @@ package body firm_number_pkg is
     return result;
   end function magnitude;
 
-  function with_sign_of(number, other : std_logic_vector) return std_logic_vector is
+  function with_sign_of(number, other : std_logic_vector; exponent_bits : positive) return std_logic_vector is
     variable result : std_logic_vector(number'length-1 downto 0);
   begin
     result              := number;
-    result(result'left) := other(other'left);
+    result(result'left) := other(other'left) and not to_bit_of(is_nan(other, exponent_bits));
     return result;
   end function with_sign_of;
 
