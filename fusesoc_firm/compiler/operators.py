@@ -49,9 +49,6 @@ class Operator:
     has_wait: bool
     width: int
     operand: int
-    lut: int
-    ff: int
-    dsp: int
 
 
 def table_file() -> Path:
@@ -94,9 +91,6 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
         facts["interval"] != 1,
         width if node.operation == "to_integer" else node.kind.bits,
         width if node.operation == "to_float" else size.bits,
-        facts["lut"],
-        facts["ff"],
-        facts["dsp"],
     )
 
 

@@ -25,11 +25,11 @@ from fusesoc_firm.compiler.values import (
     Unbound,
     UnmergeableError,
     Value,
-    common_kind,
     converted,
     described,
+    widened,
 )
-from fusesoc_firm.frame.model import names_of
+from fusesoc_firm.frame.model import Fixed, all_nodes, names_of
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
 
@@ -254,15 +254,9 @@ class _Run:
 
     def _widened(self, path: str, first: Node, value: Node) -> tuple[Kind, int, int]:
         try:
-            kind = common_kind(first.kind, value.kind)
+            return widened(first, value, self.states.get(path))
         except UnmergeableError as error:
             self._refuse(f"'{path}' is {error}", "give it one type")
-        if kind.is_float:
-            return kind, 0, 0
-        low, high = min(first.low, value.low), max(first.high, value.high)
-        if path in self.states and (low, high) != self.states[path][1:]:
-            low, high = kind.limits
-        return kind, low, high
 
     def _refuse(self, message: str, hint: str = "") -> NoReturn:
         self.interpreter.refuse(self.node, message, hint)
@@ -405,8 +399,6 @@ def _defaults(side: Side, path: Any) -> list[Any]:
 
 
 def _leaves(side: Side) -> Iterator[Any]:
-    from fusesoc_firm.frame.model import Fixed, all_nodes
-
     for node in all_nodes(side.frame.nodes):
         if isinstance(node, Fixed):
             yield from node.fields

@@ -13,7 +13,7 @@ from typing import Any
 
 from fusesoc_firm.compiler.calls import Calls
 from fusesoc_firm.compiler.graph import Node
-from fusesoc_firm.compiler.kinds import INT, Kind
+from fusesoc_firm.compiler.kinds import INT
 from fusesoc_firm.compiler.paths import Carried, Loop, Turns
 from fusesoc_firm.compiler.values import (
     Array,
@@ -22,9 +22,9 @@ from fusesoc_firm.compiler.values import (
     Stream,
     Unbound,
     Value,
-    common_kind,
     converted,
     described,
+    widened,
 )
 
 _MOST_TURNS = 4096
@@ -199,8 +199,10 @@ class Repetition(Calls):
                     f"the loop leaves {described(after)} in '{what}', which was {described(before)}",
                     "a loop over an array carries numbers only",
                 )
-            wanted = self._widened(before, after, known, node)
-            if known and wanted == (known.value.kind, known.value.low, known.value.high):
+            expected = (known.value.kind, known.value.low, known.value.high) if known else None
+            with self._merging(node):
+                wanted = widened(before, after, expected)
+            if known and wanted == expected:
                 loop.carried[key].next = converted(self.graph, after, known.value.kind)
                 continue
             kind, *limits = wanted
@@ -210,18 +212,6 @@ class Repetition(Calls):
             )
             changed[key] = Carried(str(name), converted(self.graph, before, kind), leaf)
         return changed
-
-    def _widened(self, before: Node, after: Node, known: Carried | None, node: ast.AST) -> tuple[Kind, int, int]:
-        """Return the kind and the limits of a carried value."""
-        with self._merging(node):
-            kind = common_kind(before.kind, after.kind)
-        if kind.is_float:
-            return kind, 0, 0
-        low, high = min(before.low, after.low), max(before.high, after.high)
-        if known and not known.value.kind.is_float and (low < known.value.low or high > known.value.high):
-            # It grows with each element.
-            low, high = kind.limits
-        return kind, low, high
 
     def _after(self, loop: Loop, carried: Mapping[Any, Carried], names: dict[str, Value], memory: Memory) -> None:
         """Set the names and the memory after a loop."""

@@ -146,6 +146,19 @@ def common_kind(one: Kind, other: Kind) -> Kind:
     return result_kind(lambda a, b: a + b, one, other)
 
 
+def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:
+    """Return the kind and limits of a number that is `first`, and is replaced by `after` again and again.
+
+    `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
+    """
+    kind = common_kind(first.kind, after.kind)
+    if kind.is_float:
+        return kind, 0, 0
+    limits = min(first.low, after.low), max(first.high, after.high)
+    # A number that grows beyond expectation may grow each time.
+    return (kind, *(kind.limits if known and limits != known[1:] else limits))
+
+
 @dataclass(frozen=True)
 class Merge:
     """The merge of two paths: the values if the condition holds, and the others.
