@@ -28,7 +28,7 @@ _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
 def typed(frame: Frame, message: Mapping[str, Any], numbers: str = "") -> Message:
     """Return a message with numbers of NumPy; floats have the type `numbers`, if it is given."""
-    types = {_names(part): _type(part, numbers) for part in _numbers(frame)}
+    types = {part.names: _type(part, numbers) for part in _numbers(frame)}
     made: Message = _typed(message, (), types)
     return made
 
@@ -41,12 +41,13 @@ def _numbers(frame: Frame) -> Iterator[FrameField | Data]:
             yield node
 
 
-def _names(part: FrameField | Data) -> tuple[str, ...]:
-    return part.names
+def _wire(part: FrameField | Data) -> Any:
+    """Return the wire type of a field, or of an array's elements."""
+    return part.element if isinstance(part, Data) else part.type
 
 
 def _type(part: FrameField | Data, numbers: str) -> Callable[[Any], Any]:
-    wire = part.element if isinstance(part, Data) else part.type
+    wire = _wire(part)
     if wire.name == "bool":
         # An array of variable size has bytes.
         return np.uint8 if isinstance(part, Data) else bool
@@ -65,7 +66,7 @@ def _typed(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], Ca
 
 def plain(frame: Frame, answer: Any) -> Any:
     """Return an answer with Python's numbers: integers wrap in their field, and each NaN is the positive quiet NaN."""
-    bits = {_names(part): (part.element if isinstance(part, Data) else part.type) for part in _numbers(frame)}
+    bits = {part.names: _wire(part) for part in _numbers(frame)}
     return _plain(answer, (), bits)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -68,11 +68,6 @@ class Part:
     segment: int
     number: int
 
-    @property
-    def is_text(self) -> bool:
-        """Whether the part is a string."""
-        return self.kind is None
-
 
 @dataclass(frozen=True)
 class Side:
@@ -126,7 +121,7 @@ def message_value(side: Side, graph: Graph, memory: Memory, numbers: Kind | None
     """Return a message as the function receives it; floats have the kind `numbers`, if it is given."""
     tree: dict[Any, Any] = {}
     for leaf in side.leaves:
-        for element, steps in enumerate(_places(leaf.path)):
+        for element, steps in enumerate(places(leaf.path)):
             made = graph.leaf("input", leaf.kind, leaf.bits(element), phase=2 * leaf.segment)
             _set(tree, steps, converted(graph, made, numbers) if numbers and leaf.kind.is_float else made)
     for part in side.parts:
@@ -150,14 +145,14 @@ def element_signal(part: Part) -> str:
     return f"{part.stream.removesuffix('_axis')}_element"
 
 
-def _places(path: Path) -> Iterator[tuple[str | int, ...]]:
-    """Yield the names and indices that lead to each element of a leaf, in wire order."""
+def places(path: Path) -> list[tuple[str | int, ...]]:
+    """Return the names and indices that lead to each element of a leaf, in wire order."""
     found: list[tuple[str | int, ...]] = [()]
     for step in path:
         found = [(*item, step.name) for item in found]
         if step.count is not None:
             found = [(*item, index) for item in found for index in range(step.count)]
-    yield from found
+    return found
 
 
 def _set(tree: dict[Any, Any], steps: Sequence[str | int], value: Value) -> None:
@@ -172,8 +167,3 @@ def _objects(tree: dict[Any, Any], memory: Memory) -> Any:
     content = {key: _objects(value, memory) if isinstance(value, dict) else value for key, value in tree.items()}
     # The elements of a list are numbered from 0.
     return memory.new(Array() if 0 in content else Record(), content)
-
-
-def places(leaf: Leaf) -> list[tuple[str | int, ...]]:
-    """Return the names and indices that lead to each element of a leaf, in wire order."""
-    return [*_places(leaf.path)]

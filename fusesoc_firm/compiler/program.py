@@ -332,7 +332,7 @@ class _Run:
         found: dict[str, list[Node]] = {}
         for leaf in side.leaves:
             defaults = _defaults(side, leaf.path)
-            for element, steps in enumerate(places(leaf)):
+            for element, steps in enumerate(places(leaf.path)):
                 condition, given = self._at(value, steps)
                 fallback = converted(self.graph, self.graph.constant(defaults[element % len(defaults)]), leaf.kind)
                 node = fallback if given is None else self._field(given, leaf.kind, steps)

@@ -108,7 +108,7 @@ class Writer:
             return self.value(node, phase, step)
         if node.is_constant:
             return self._constant(node, bits)
-        return f"std_logic_vector({_signed_number(node, self.value(node, phase, step), bits)})"
+        return f"std_logic_vector({_number(node, self.value(node, phase, step), bits)})"
 
     def _constant(self, node: Node, bits: int = 0) -> str:
         if node.kind == BOOL:
@@ -129,24 +129,17 @@ class Writer:
             case "invert" if node.kind == BOOL:
                 return f"(not {given[0]})"
             case "invert":
-                return self._cast(node, f"not {self._signed(node.operands[0], given[0], node)}")
+                return _vector(f"not {_number(node.operands[0], given[0], node.bits)}")
             case "wrap":
-                return self._cast(node, self._signed(node.operands[0], given[0], node))
+                return _vector(_number(node.operands[0], given[0], node.bits))
             case "shift_left":
-                return self._cast(node, f"shift_left({self._signed(node.operands[0], given[0], node)}, {node.payload})")
+                return _vector(f"shift_left({_number(node.operands[0], given[0], node.bits)}, {node.payload})")
             case "shift_right":
                 # The bits above the result's are shifted into it.
                 wide = node.operands[0].bits
-                shifted = f"shift_right({self._signed(node.operands[0], given[0], node.operands[0])}, {node.payload})"
-                return self._cast(node, f"fitted({shifted}, {node.bits})" if wide != node.bits else shifted)
+                shifted = f"shift_right({_number(node.operands[0], given[0], wide)}, {node.payload})"
+                return _vector(f"fitted({shifted}, {node.bits})" if wide != node.bits else shifted)
         return given[0]
-
-    def _signed(self, operand: Node, text: str, result: Node) -> str:
-        """Return an integer operand as a number with the result's width."""
-        return _number(operand, text, result.bits)
-
-    def _cast(self, node: Node, text: str) -> str:
-        return f"std_logic_vector({text})"
 
     def _combinational(self, node: Node) -> str:
         """Return the expression of an operation from its operands in the step in which it is evaluated."""
@@ -160,14 +153,10 @@ class Writer:
                 return f"{given[0]} {node.operation} {given[1]}"
             case "less" | "at_most" | "equal":
                 return self._comparison(node, given)
-            case "and" | "or" | "xor":
-                pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
-                return f"std_logic_vector({pair[0]} {node.operation} {pair[1]})"
-            case "multiply":
-                pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
-                return f"std_logic_vector(fitted({pair[0]} * {pair[1]}, {node.bits}))"
-        pair = [_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True)]
-        return f"std_logic_vector({pair[0]} {_INTEGER_OPERATORS[node.operation]} {pair[1]})"
+        one, other = (_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True))
+        if node.operation == "multiply":
+            return _vector(f"fitted({one} * {other}, {node.bits})")
+        return _vector(f"{one} {_INTEGER_OPERATORS.get(node.operation, node.operation)} {other}")
 
     def _comparison(self, node: Node, given: Sequence[str]) -> str:
         one = node.operands[0]
@@ -175,7 +164,7 @@ class Writer:
             return f"is_{node.operation}({given[0]}, {given[1]}, {one.kind.exponent_bits})"
         # With a bit for the sign, all integers are compared as signed ones.
         bits = max(item.bits + (not item.is_signed) for item in node.operands)
-        pair = [_signed_number(item, text, bits) for item, text in zip(node.operands, given, strict=True)]
+        pair = [_number(item, text, bits) for item, text in zip(node.operands, given, strict=True)]
         return f"to_bit_of({pair[0]} {'<' if node.operation == 'less' else '='} {pair[1]})"
 
     # The parts of the template.
@@ -374,7 +363,7 @@ class Writer:
         text = self.value(operand, issue.node.phase, issue.start)
         if operand.kind.is_float:
             return text
-        return f"std_logic_vector({_signed_number(operand, text, issue.unit.operator.operand)})"
+        return f"std_logic_vector({_number(operand, text, issue.unit.operator.operand)})"
 
     def _state(self, state: Any) -> Context:
         end = len(self.schedule.steps)
@@ -541,6 +530,10 @@ def _type(bits: int, is_bit: bool) -> str:
     return vhdl_type(None if is_bit else bits)
 
 
+def _vector(number: str) -> str:
+    return f"std_logic_vector({number})"
+
+
 def _number(node: Node, text: str, bits: int) -> str:
     """Return an integer as a number of a width; its sign decides how it is extended."""
     if node.kind == BOOL:
@@ -550,8 +543,3 @@ def _number(node: Node, text: str, bits: int) -> str:
     made = f"{'signed' if is_signed else 'unsigned'}({text})"
     made = made if bits_here == bits else f"fitted({made}, {bits})"
     return made if is_signed else f"signed({made})"
-
-
-def _signed_number(node: Node, text: str, bits: int) -> str:
-    """Return an integer as a signed number of a width."""
-    return _number(node, text, bits)
