@@ -19,16 +19,7 @@ async def run(command: Sequence[str], folder: Path, take: Callable[[str], None])
 
     A cancelled call ends the program and all programs that it has started.
     """
-    process = await asyncio.create_subprocess_exec(
-        *command,
-        cwd=folder,
-        # The launcher of our own builds would answer the steps from its cache.
-        env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-        start_new_session=True,
-    )
+    process = await _started(command, folder)
     assert process.stdout
     try:
         rest = b""
@@ -39,9 +30,31 @@ async def run(command: Sequence[str], folder: Path, take: Callable[[str], None])
         if rest:
             take(rest.decode(errors="replace"))
         return await process.wait()
-    finally:
-        if process.returncode is None:
-            await _end(process)
+    except BaseException:
+        await _end(process)
+        raise
+
+
+async def _started(command: Sequence[str], folder: Path) -> asyncio.subprocess.Process:
+    """Start a program as the leader of a session; a cancelled call ends what that session has by then."""
+    starting = asyncio.create_task(
+        asyncio.create_subprocess_exec(
+            *command,
+            cwd=folder,
+            # The launcher of our own builds would answer the steps from its cache.
+            env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+            start_new_session=True,
+        )
+    )
+    try:
+        # A start that is cancelled would end the program alone, which may have started others.
+        return await asyncio.shield(starting)
+    except asyncio.CancelledError:
+        await _end(await starting)
+        raise
 
 
 async def _end(process: asyncio.subprocess.Process) -> None:

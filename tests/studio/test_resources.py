@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import random
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ import aiohttp
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.studio import resources
+from fusesoc_firm.studio import processes, resources
 from fusesoc_firm.studio.resources import blocks_of, cells_of, slowest
 from fusesoc_firm.studio.server import Studio
 from fusesoc_firm.tools.programs import find
@@ -144,6 +145,30 @@ def test_a_page_that_leaves_ends_the_synthesis(studio: Studio, tmp_path: Path, m
     last = until_done(studio)[-1]
     assert last["step"] == "failed"
     assert "nothing works" in last["reason"]
+
+
+def test_a_cancelled_program_ends_at_any_moment(tmp_path: Path) -> None:
+    """While it is started as well as later, and when those that it has started outlive it."""
+    seed = random.randrange(2**32)
+    print("seed:", seed)
+    source = random.Random(seed)
+    noted = tmp_path / "pids"
+    noted.touch()
+
+    async def cancelled(last: str) -> None:
+        command = ["sh", "-c", f"sleep 1000 & echo $! >> {noted}; {last}"]
+        running = asyncio.create_task(processes.run(command, tmp_path, print))
+        await asyncio.sleep(source.random() / 50)
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    async def all_cancelled() -> None:
+        await asyncio.gather(*map(cancelled, ("wait", "exit") * 20))
+
+    asyncio.run(all_cancelled())
+    for word in noted.read_text(encoding="ascii").split():
+        while not has_ended(int(word)):
+            time.sleep(0.1)
 
 
 def test_a_system_without_a_core_is_told_so(studio: Studio, tmp_path: Path) -> None:
