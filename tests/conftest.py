@@ -232,7 +232,8 @@ class _Activity:
 def _seconds_in_queues(pid: int) -> float:
     """Return how long the threads of a process have waited for a processor: the second number of Linux's schedstat."""
     nanoseconds = 0
-    for file in Path(f"/proc/{pid}/task").glob("*/schedstat"):
-        with suppress(OSError):  # the thread has ended
-            nanoseconds += int(file.read_text().split()[1])
+    with suppress(OSError):  # the process has ended
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError):  # the thread has ended
+                nanoseconds += int((thread / "schedstat").read_text().split()[1])
     return nanoseconds / 1e9
