@@ -31,7 +31,7 @@ from tests.shared import made_once
 from tests.wiznet.sequencer import ABORTED, ACCESSES, LAST, Sequencer
 
 HERE = Path(__file__).parent
-*_HARDWARE, _LINK = core_files("cdc/sync", "net/wiznet", "net/wiznet_node")
+*_HARDWARE, _LINK = core_files("axis/package", "cdc/sync", "net/wiznet", "net/wiznet_node")
 _MS_PER_UNIT = 64
 _IDLE_BYTES = 5  # of a turn without news
 _IDLE_SECONDS = 0.002

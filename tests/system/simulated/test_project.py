@@ -78,7 +78,7 @@ def test_a_new_project_passes(tmp_path: Path, given: str, taken: str, ready: lis
 
 
 def test_hardware_passes_messages_to_software(tmp_path: Path) -> None:
-    folder = made(tmp_path, Project("first", "sensor_msgs/Imu", "geometry_msgs/Vector3Stamped", language="python"))
+    folder = made(tmp_path, Project("first", "sensor_msgs/Imu", "geometry_msgs/Vector3Stamped", language="software"))
     assert (folder / "software" / "first.py").is_file()
     assert (folder / "rtl" / "pass_through.vhd").is_file()
     assert build(call(folder / "first.yaml", folder / "stimuli.yaml", folder / "model.py"), tmp_path / "s").passes()
