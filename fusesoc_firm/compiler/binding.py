@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.operators import is_operator
@@ -102,7 +103,9 @@ def uses(schedule: Schedule) -> Iterator[Use]:
             yield Use(item.first, phase - 1, schedule.steps[phase - 1] - 1)
             if item.next is not None:
                 yield Use(item.next, phase, schedule.steps[phase] - 1)
-        yield from (Use(node, phase, schedule.steps[phase] - 1) for node in loop.appended.values())
+    for made in program.made():
+        phase = 2 * made.loop.number + 1
+        yield from (Use(node, phase, schedule.steps[phase] - 1) for node in chain(*made.fields.values()))
     yield from (Use(state.next, end, 0) for state in program.states)
     for answer in program.answers:
         yield Use(answer.condition, end, 0)

@@ -119,11 +119,11 @@ class Calls(Expressions):
                 self.refuse(node, "the number of elements depends on a condition", "append in each case")
             content[len(content)] = value
             return (None,)
-        if content or owner in stream.appended or not self.path.is_constant or not isinstance(value, Node):
+        if content or owner in stream.appended or not self.path.is_constant or not isinstance(value, Node | Record):
             self.refuse(
                 node,
-                "a loop over an array appends one number for each element, always, to an empty list",
-                "append one number at the end of the loop's body, and choose it with 'if' before",
+                "a loop over an array appends one number or message for each element, always, to an empty list",
+                "append one at the end of the loop's body, and choose it with 'if' before",
             )
         stream.appended[owner] = value
         return (None,)

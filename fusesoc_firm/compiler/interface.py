@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import INT, KINDS, Kind
 from fusesoc_firm.compiler.values import Array, Memory, Record, Stream, Value, converted
-from fusesoc_firm.converter.message_ports import ElementPorts, StreamPorts, message_side
+from fusesoc_firm.converter.message_ports import (
+    ElementPorts,
+    MessagePort,
+    MessageSide,
+    StreamPorts,
+    array_ports,
+    message_side,
+)
 from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.converter.segments import segments_of
-from fusesoc_firm.frame.model import Data, DataKind, Frame, Path, names_of
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, names_of
 from fusesoc_firm.frame.values import dotted
 
 # A payload is shorter than 2**30 bytes.
@@ -54,10 +61,10 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Part:
-    """A string or an array of variable size: the prefix of its stream's ports, its length, and its elements' kind.
+    """A string or an array of variable size: its place in the message, and the prefix of its stream's ports.
 
-    `number` counts the parts of the message in wire order; the part follows the segment of its length. The elements
-    have no kind if they are characters.
+    `length` is the port with the number of elements. `number` counts the parts of the message in wire order; the part
+    follows the segment of its length. The elements have no kind if they are characters.
     """
 
     path: Path
@@ -68,16 +75,62 @@ class Part:
     segment: int
     number: int
 
+    @property
+    def element(self) -> str:
+        """The prefix of the signals of an element: `_valid`, `_last` and `_ready`, and the element itself.
+
+        It does not begin as a port, so it never equals one.
+        """
+        return f"element_{self.stream.removesuffix('_axis')}"
+
+
+@dataclass(frozen=True)
+class Elements:
+    """An array of messages, of strings or of many numbers: its place in the message, and the ports of an element.
+
+    An array of fixed size has a `count` in place of the port `length`. `ports` are all others; their names begin with
+    `element`. `leaves` are those of an element's own fields, and `within` the paths of its strings and arrays.
+    """
+
+    path: Path
+    element: str
+    length: str | None
+    count: int | None
+    type: str
+    leaves: tuple[Leaf, ...]
+    within: tuple[Path, ...]
+    ports: tuple[MessagePort, ...]
+    segment: int
+    number: int
+
+    @property
+    def shape(self) -> tuple[object, ...]:
+        """What two arrays have in common if the elements of one can be passed on as those of the other."""
+        skipped = len(self.element)
+        return (self.type, *((port.name[skipped:], port.width) for port in self.ports))
+
+    @property
+    def inner(self) -> list[MessagePort]:
+        """The ports of an element's strings and arrays."""
+        own = {leaf.port for leaf in self.leaves}
+        own |= {f"{self.element}_{signal}" for signal in ("segment_valid", "valid", "last", "ready")}
+        return [port for port in self.ports if port.name not in own]
+
 
 @dataclass(frozen=True)
 class Side:
-    """A message of a function: its ports' prefix, its fields and parts in wire order, and its number of segments."""
+    """A message of a function: its ports' prefix, its fields and parts in wire order, and its number of segments.
+
+    `length` tells how an answer's length comes about: `computed` from those of its parts, `given` by the function, or
+    `buffered`, so that nothing is needed before the parts.
+    """
 
     prefix: str
     frame: Frame
     leaves: tuple[Leaf, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[Part | Elements, ...]
     segments: int
+    length: str = "buffered"
 
     @property
     def is_fixed(self) -> bool:
@@ -85,23 +138,23 @@ class Side:
         return self.frame.is_fixed_size
 
 
-def side_of(prefix: str, frame: Frame) -> Side:
-    """Return the ports of a message."""
+def side_of(prefix: str, frame: Frame, length: str = "buffered") -> Side:
+    """Return the ports of a message; `length` is that of an answer."""
     if frame.is_fixed_size:
         leaves = tuple(_leaf(prefix, port, 0) for port in field_ports(frame) if port.field.is_used)
         return Side(prefix, frame, leaves, (), 1)
-    segments = segments_of(frame)
+    segments, ports = segments_of(frame), message_side(frame)
     found: list[Leaf] = []
-    parts: list[Part] = []
-    for item in message_side(frame).parts:
+    parts: list[Part | Elements] = []
+    for item in ports.parts:
         match item:
-            case FieldPort():
-                found.append(_leaf(prefix, item, segments.fields[item.field.path]))
-            case StreamPorts():
-                parts.append(_part(prefix, item, segments.parts[item.part.path], len(parts)))
-            case ElementPorts():
-                raise AssertionError("the accelerator has passed check_streams")
-    return Side(prefix, frame, tuple(found), tuple(parts), segments.count)
+            case FieldPort(field=leaf) if leaf.path in segments.fields:
+                found.append(_leaf(prefix, item, segments.fields[leaf.path]))
+            case StreamPorts(part=part) if part.path in segments.parts and ("loop", part.path) not in ports.by_path:
+                parts.append(_part(prefix, item, segments.parts[part.path], len(parts)))
+            case ElementPorts(loop=loop) if loop.path in segments.parts:
+                parts.append(_elements(prefix, item, ports, segments.parts[loop.path], len(parts)))
+    return Side(prefix, frame, tuple(found), tuple(parts), segments.count, length)
 
 
 def _leaf(prefix: str, port: FieldPort, segment: int) -> Leaf:
@@ -117,32 +170,75 @@ def _part(prefix: str, ports: StreamPorts, segment: int, number: int) -> Part:
     return Part(data.path, stream, prefix + ports.length, kind, 8 * data.element.size, segment, number)
 
 
+def _elements(prefix: str, ports: ElementPorts, side: MessageSide, segment: int, number: int) -> Elements:
+    loop = ports.loop
+    fields = [leaf for node in loop.body if isinstance(node, Fixed) for leaf in node.fields if leaf.count]
+    leaves = dict.fromkeys(side.field(leaf) for leaf in fields if leaf.is_used)
+    # The width of the streams does not matter here: they are connected, or empty.
+    found = [replace(port, name=prefix + port.name) for port in array_ports(side, loop, 8, set())]
+    return Elements(
+        loop.path,
+        prefix + ports.name,
+        None if loop.count is not None else prefix + ports.length,
+        loop.count,
+        loop.ros_type,
+        tuple(_leaf(prefix, port, segment) for port in leaves),
+        tuple(node.path for node in loop.body if isinstance(node, Data | Loop) and node.path != loop.path),
+        tuple(found),
+        segment,
+        number,
+    )
+
+
 def message_value(side: Side, graph: Graph, memory: Memory, numbers: Kind | None) -> Record:
     """Return a message as the function receives it; floats have the kind `numbers`, if it is given."""
-    tree: dict[Any, Any] = {}
-    for leaf in side.leaves:
-        for element, steps in enumerate(places(leaf.path)):
-            made = graph.leaf("input", leaf.kind, leaf.bits(element), phase=2 * leaf.segment)
-            _set(tree, steps, converted(graph, made, numbers) if numbers and leaf.kind.is_float else made)
+    tree = _fields(graph, side.leaves, numbers)
     for part in side.parts:
-        limits = 0, _MOST_ELEMENTS
-        length = graph.leaf("input", INT, Bits(part.length, limits[1].bit_length() - 1), limits, 2 * part.segment)
-        # The limits need a bit less than the port has.
-        make = partial(_element, graph, part, numbers) if part.kind else None
-        _set(tree, names_of(part.path), Stream(part.stream, dotted(names_of(part.path)), part.number, length, make))
-    message: Record = _objects(tree, memory)
+        phase = 2 * part.segment
+        length = graph.constant(part.count) if isinstance(part, Elements) and part.count is not None else None
+        if length is None:
+            limits = 0, _MOST_ELEMENTS
+            # The limits need a bit less than the port has.
+            length = graph.leaf("input", INT, Bits(str(part.length), limits[1].bit_length() - 1), limits, phase)
+        name = dotted(names_of(part.path))
+        _set(tree, names_of(part.path), Stream(part, name, part.number, length, _maker(graph, part, numbers)))
+    message: Record = objects(tree, memory)
     return message
 
 
-def _element(graph: Graph, part: Part, numbers: Kind | None, phase: int) -> Node:
-    assert part.kind is not None
-    made = graph.leaf("input", part.kind, Bits(element_signal(part)), phase=phase)
-    return converted(graph, made, numbers) if numbers and part.kind.is_float else made
+def _fields(graph: Graph, leaves: Sequence[Leaf], numbers: Kind | None, phase: int | None = None) -> dict[Any, Any]:
+    """Return the values of fields by the steps of their paths: those of an element, if the phase of its loop is given.
+
+    The paths of an element's fields begin behind that of the array.
+    """
+    tree: dict[Any, Any] = {}
+    for leaf in leaves:
+        for number, steps in enumerate(places(leaf.path)):
+            made = graph.leaf("input", leaf.kind, leaf.bits(number), phase=2 * leaf.segment if phase is None else phase)
+            _set(tree, steps, converted(graph, made, numbers) if numbers and leaf.kind.is_float else made)
+    return tree
 
 
-def element_signal(part: Part) -> str:
-    """Return the signal with an element of a stream."""
-    return f"{part.stream.removesuffix('_axis')}_element"
+def _maker(graph: Graph, part: Part | Elements, numbers: Kind | None) -> Callable[[int, Memory], Value] | None:
+    """Return the function that makes the value of an element in a phase, or None for elements that are texts."""
+    if isinstance(part, Elements):
+        return partial(_message, graph, part, numbers) if part.leaves else None
+    return partial(_number, graph, part, part.kind, numbers) if part.kind else None
+
+
+def _number(graph: Graph, part: Part, kind: Kind, numbers: Kind | None, phase: int, _: Memory) -> Node:
+    made = graph.leaf("input", kind, Bits(part.element), phase=phase)
+    return converted(graph, made, numbers) if numbers and kind.is_float else made
+
+
+def _message(graph: Graph, part: Elements, numbers: Kind | None, phase: int, memory: Memory) -> Value:
+    tree: Any = _fields(graph, part.leaves, numbers, phase)
+    for path in part.within:
+        names = names_of(path)
+        _set(tree, names, Stream(None, dotted(names), part.number, graph.constant(0), None))
+    for step in names_of(part.path):
+        tree = tree[step]
+    return objects(tree, memory)
 
 
 def places(path: Path) -> list[tuple[str | int, ...]]:
@@ -162,8 +258,10 @@ def _set(tree: dict[Any, Any], steps: Sequence[str | int], value: Value) -> None
     tree[last] = value
 
 
-def _objects(tree: dict[Any, Any], memory: Memory) -> Any:
-    """Return messages and lists for the levels of a tree."""
-    content = {key: _objects(value, memory) if isinstance(value, dict) else value for key, value in tree.items()}
+def objects(tree: Any, memory: Memory) -> Any:
+    """Return messages and lists for the levels of a tree, or a number as it is."""
+    if not isinstance(tree, dict):
+        return tree
+    content = {key: objects(value, memory) for key, value in tree.items()}
     # The elements of a list are numbered from 0.
     return memory.new(Array() if 0 in content else Record(), content)

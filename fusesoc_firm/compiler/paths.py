@@ -58,7 +58,7 @@ class Loop:
     number: int
     stream: Stream
     carried: dict[Any, Carried] = field(default_factory=dict)
-    appended: dict[Array, Node] = field(default_factory=dict)
+    appended: dict[Array, Value] = field(default_factory=dict)
 
 
 @dataclass

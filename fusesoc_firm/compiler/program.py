@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import chain
 from typing import Any, NoReturn
 
+from fusesoc_firm.compiler.answers import Answer, AnswerMaker, Made
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.interface import Part, Side, message_value, places
+from fusesoc_firm.compiler.interface import Side, message_value
 from fusesoc_firm.compiler.kinds import Kind, number_of
 from fusesoc_firm.compiler.paths import Carried, Loop
 from fusesoc_firm.compiler.source import Source
+from fusesoc_firm.compiler.streaming import problems
 from fusesoc_firm.compiler.values import (
     Array,
     Class,
     Function,
     Instance,
-    Maybe,
     Named,
-    Produced,
     Record,
-    Stream,
-    Unbound,
     UnmergeableError,
     Value,
     converted,
     described,
     widened,
 )
-from fusesoc_firm.frame.model import Fixed, all_nodes, names_of
-from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
 
 _MOST_ROUNDS = 20
@@ -44,24 +41,6 @@ class State:
     first: Node
     value: Node
     next: Node
-
-
-@dataclass
-class Sent:
-    """A string or an array of an answer: passed on from an input, produced by a loop, or empty."""
-
-    part: Part
-    value: Stream | Produced | None
-
-
-@dataclass
-class Answer:
-    """A message that the function returns: the condition to send it, its fields by port, and its parts."""
-
-    side: Side
-    condition: Node
-    fields: dict[str, list[Node]] = field(default_factory=dict)
-    parts: list[Sent] = field(default_factory=list)
 
 
 @dataclass
@@ -85,11 +64,15 @@ class Program:
                 yield item.first
                 if item.next is not None:
                     yield item.next
-            yield from loop.appended.values()
+        for made in self.made():
+            yield from chain(*made.fields.values())
         for answer in self.answers:
             yield answer.condition
-            for values in answer.fields.values():
-                yield from values
+            yield from chain(*answer.fields.values())
+
+    def made(self) -> Iterator[Made]:
+        """Yield the arrays that loops make."""
+        yield from (sent.value for answer in self.answers for sent in answer.parts if isinstance(sent.value, Made))
 
     def needed(self) -> list[Node]:
         """Return the nodes that results depend on, in their order."""
@@ -272,6 +255,9 @@ class _Run:
             )
             for path, leaf in self.leaves.items()
         ]
+        answers = AnswerMaker(self.interpreter, self.node, self.outputs).answers(self.result)
+        for message, hint in problems(answers, self.interpreter.loops, self.inputs):
+            self._refuse(message, hint)
         program = Program(
             self.name,
             self.interpreter.source,
@@ -279,126 +265,7 @@ class _Run:
             self.inputs,
             sorted(self.interpreter.loops, key=lambda loop: loop.number),
             states,
-            self._answers(),
+            answers,
         )
         program.drop_unused()
         return program
-
-    def _answers(self) -> list[Answer]:
-        values = [self.result] if len(self.outputs) == 1 else self._several()
-        return [self._answer(side, value) for side, value in zip(self.outputs, values, strict=True)]
-
-    def _several(self) -> Sequence[Value]:
-        value = self.result
-        if value is None:
-            return [None] * len(self.outputs)
-        if isinstance(value, Maybe) and isinstance(value.value, tuple):
-            value = tuple(Maybe(value.condition, item) for item in value.value)
-        if not isinstance(value, tuple) or len(value) != len(self.outputs):
-            self._refuse(
-                f"the function returns {described(value)}, not {len(self.outputs)} messages",
-                "return a tuple with a message, or None, for each output",
-            )
-        return value
-
-    def _answer(self, side: Side, value: Value) -> Answer:
-        condition = self.graph.true()
-        while isinstance(value, Maybe):
-            condition, value = self.graph.both(condition, value.condition), value.value
-        if value is None:
-            return Answer(
-                side,
-                self.graph.constant(value=False),
-                self._fields(side, None),
-                [Sent(part, None) for part in side.parts],
-            )
-        if not isinstance(value, Record):
-            self._refuse(
-                f"the function returns {described(value)}, not a message",
-                "return {'field': value}, or None to send nothing",
-            )
-        self._check_names(side.frame.names, value)
-        fields = self._fields(side, value)
-        return Answer(side, condition, fields, [self._sent(part, value) for part in side.parts])
-
-    def _check_names(self, known: Any, value: Record, path: str = "") -> None:
-        for name, item in self.interpreter.memory.cells[value].items():
-            if name not in known:
-                self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
-            if isinstance(inner := item.value if isinstance(item, Maybe) else item, Record):
-                self._check_names(known[name], inner, f"{path}{name}.")
-
-    def _fields(self, side: Side, value: Record | None) -> dict[str, list[Node]]:
-        found: dict[str, list[Node]] = {}
-        for leaf in side.leaves:
-            defaults = _defaults(side, leaf.path)
-            for element, steps in enumerate(places(leaf.path)):
-                condition, given = self._at(value, steps)
-                fallback = converted(self.graph, self.graph.constant(defaults[element % len(defaults)]), leaf.kind)
-                node = fallback if given is None else self._field(given, leaf.kind, steps)
-                found.setdefault(leaf.port, []).append(self.graph.choose(condition, node, fallback))
-        return found
-
-    def _at(self, value: Value, steps: Sequence[str | int]) -> tuple[Node, Value]:
-        """Return the value at a path of an answer, or None without one, and the condition that it is there."""
-        condition = self.graph.true()
-        for step in (*steps, None):
-            while isinstance(value, Maybe):
-                condition, value = self.graph.both(condition, value.condition), value.value
-            if step is None or value is None:
-                break
-            if isinstance(value, tuple) and isinstance(step, int):
-                value = value[step] if step < len(value) else None
-            elif isinstance(value, Record | Array):
-                value = self.interpreter.memory.cells[value].get(step)
-            else:
-                self._refuse(f"field '{step}' is in {described(value)}, which has no fields")
-        return condition, value
-
-    def _field(self, value: Value, kind: Kind, steps: Sequence[str | int]) -> Node:
-        name = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
-        if isinstance(value, Unbound):
-            self._refuse(f"field '{name}' has no value on one of the paths", "give it one on each path")
-        if not isinstance(value, Node):
-            self._refuse(f"field '{name}' is {described(value)}, not a number")
-        if value.kind.is_float and not kind.is_float:
-            self._refuse(
-                f"field '{name}' is an integer ({kind}), and the answer is a {value.kind}",
-                "convert it with int() or round()",
-            )
-        made: Node = self.interpreter.checked(self.node, self.interpreter.arithmetic.to, value, kind)
-        return made
-
-    def _sent(self, part: Part, value: Record) -> Sent:
-        condition, given = self._at(value, names_of(part.path))
-        name = dotted(names_of(part.path))
-        if not condition.is_constant and given is not None:
-            self._refuse(f"'{name}' is only in some answers", "send it always, or return None")
-        match given:
-            case None | "":
-                return Sent(part, None)
-            case Array() if not self.interpreter.memory.cells[given]:
-                return Sent(part, None)
-            case Stream():
-                return Sent(part, given)
-            case Produced(loop=loop, element=element) if part.kind:
-                return Sent(part, Produced(loop, self._field(element, part.kind, names_of(part.path))))
-        return self._refuse(
-            f"'{name}' is {described(given)}",
-            "pass one of the message on, or append to an empty list in a loop over an array",
-        )
-
-
-def _defaults(side: Side, path: Any) -> list[Any]:
-    """Return the default values of a field's elements."""
-    leaf = next(item for item in _leaves(side) if item.path == path)
-    given = leaf.default
-    if given is None:
-        return [False if leaf.type.name == "bool" else 0]
-    return [*given] if isinstance(given, tuple) else [given]
-
-
-def _leaves(side: Side) -> Iterator[Any]:
-    for node in all_nodes(side.frame.nodes):
-        if isinstance(node, Fixed):
-            yield from node.fields

@@ -19,6 +19,7 @@ from fusesoc_firm.compiler.values import (
     Array,
     Memory,
     Produced,
+    Record,
     Stream,
     Unbound,
     Value,
@@ -131,15 +132,15 @@ class Repetition(Calls):
 
     def _element(self, stream: Stream, loop: Loop, node: ast.AST) -> Value:
         if stream.element is None:
-            self.refuse(node, f"'{stream.path}' can only be passed on", "loop over an array of numbers")
-        return stream.element(2 * loop.number + 1)
+            self.refuse(node, f"'{stream.path}' can only be passed on", "loop over an array of numbers or messages")
+        return stream.element(2 * loop.number + 1, self.memory)
 
     def stream_loop(self, node: ast.AST, stream: Stream, turn: Callable[[Loop], None]) -> None:
         """Run the body of a loop over a stream, until the kinds of the values that it carries are known."""
-        if self.path.phase % 2 or not self.path.is_constant:
-            self.refuse(node, "a loop over an array within 'if' is not hardware", "put the 'if' into the loop")
         if any(item.stream is stream for item in self.loops):
             self.refuse(node, f"'{stream.path}' is read twice; its elements pass once", "compute both in one loop")
+        # The loop runs on all paths; its results count on this one.
+        path, self.path = self.path, self.graph.true()
         names, memory = dict(self.names), self.memory
         carried: dict[Any, Carried] = {}
         for _ in range(_MOST_ROUNDS):
@@ -158,6 +159,9 @@ class Repetition(Calls):
             carried |= changed
         else:
             self.refuse(node, "the types of this loop's values cannot be determined", "give them a type of NumPy")
+        if any(element in memory.cells for element in loop.appended.values() if isinstance(element, Record)):
+            self.refuse(node, "the loop appends the same message again and again", "append a new one: {'x': ...}")
+        self.path = path
         self.loops.append(loop)
         self._after(loop, carried, names, memory)
 
@@ -215,7 +219,7 @@ class Repetition(Calls):
 
     def _after(self, loop: Loop, carried: Mapping[Any, Carried], names: dict[str, Value], memory: Memory) -> None:
         """Set the names and the memory after a loop."""
-        inner = {key for key in self.names if key not in names}
+        inner, made_in_loop = {key for key in self.names if key not in names}, self.memory
         self.names, self.memory = dict(names), memory
         for key in inner:
             self.names[key] = Unbound(key)
@@ -228,9 +232,17 @@ class Repetition(Calls):
             )
             self._put(key, final)
         for array, element in loop.appended.items():
+            self._keep(element, made_in_loop)
             for key, value in [*self._places(self.names, self.memory)]:
                 if value is array:
                     self._put(key, Produced(loop.number, element))
+
+    def _keep(self, value: Value, memory: Memory) -> None:
+        """Keep the content of a message that was made in a loop, as it was at the end of a turn."""
+        if isinstance(value, Record | Array) and value not in self.memory.cells:
+            self.memory.cells[value] = memory.cells[value]
+            for item in memory.cells[value].values():
+                self._keep(item, memory)
 
     def _value_listcomp(self, node: ast.ListComp | ast.GeneratorExp) -> Value:
         first, *others = node.generators

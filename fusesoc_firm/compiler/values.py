@@ -52,17 +52,17 @@ class Class:
 
 @dataclass(frozen=True)
 class Stream:
-    """A string or an array of variable size in a message: its stream, its number in the message and its length.
+    """A string or an array of a message: its ports, its number in the message and its length.
 
-    `element` returns the value of an element for the loop that reads the array. Without it, as for a string, the value
-    can only be passed on.
+    `element` returns the value of an element for the loop that reads the array, in the loop's phase. Without it, as for
+    a string, the value can only be passed on.
     """
 
-    name: str
+    part: Any
     path: str
     number: int
     length: Node
-    element: Callable[[int], Any] | None
+    element: Callable[[int, Memory], Any] | None
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Produced:
     """A list to which a loop over a stream appended one element for each of the stream's elements."""
 
     loop: int
-    element: Node
+    element: Value
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from fusesoc_firm.compiler.answers import Answer, Made, Sent
 from fusesoc_firm.compiler.binding import Binding, Register
 from fusesoc_firm.compiler.graph import LEAVES, Node
-from fusesoc_firm.compiler.interface import Part, element_signal
+from fusesoc_firm.compiler.interface import Elements, Part
 from fusesoc_firm.compiler.kinds import BOOL, INT, bits_of
 from fusesoc_firm.compiler.operators import is_operator
 from fusesoc_firm.compiler.paths import Loop
-from fusesoc_firm.compiler.program import Answer, Sent
 from fusesoc_firm.compiler.schedule import TRANSPARENT, Issue, Unit
-from fusesoc_firm.compiler.values import Produced, Stream
+from fusesoc_firm.compiler.streaming import is_streamed, length_of
+from fusesoc_firm.compiler.values import Stream
+from fusesoc_firm.converter.message_ports import MessagePort
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.text.naming import KEYWORDS, VHDL_PREDEFINED, distinct_identifiers
 from fusesoc_firm.text.render import Context
@@ -64,7 +66,10 @@ class Writer:
             wanted.append((unit, f"{unit.operator.operation}_{unit.operator.operand}_{unit.number}"))
         ports = [leaf.port for answer in self.program.answers for leaf in answer.side.leaves]
         ports += [leaf.port for side in self.program.inputs for leaf in side.leaves]
-        reserved = [*_SIGNALS, *KEYWORDS, *VHDL_PREDEFINED, *ports]
+        answers = [_own_signal(name, answer) for answer in self.program.answers for name in ("dropped", "segments")]
+        sides = [*self.program.inputs, *(answer.side for answer in self.program.answers)]
+        elements = [part.element for side in sides for part in side.parts]
+        reserved = [*_SIGNALS, *KEYWORDS, *VHDL_PREDEFINED, *ports, *answers, *elements]
         names = distinct_identifiers([_words(name) for _, name in wanted], reserved)
         self._names = {key: name for (key, _), name in zip(wanted, names, strict=True)}
 
@@ -288,11 +293,12 @@ class Writer:
             if count and phase % 2 == 0 and (phase == 0 or self.streams):
                 found.setdefault(self.bases[phase], []).append(self._segment(phase // 2))
         for loop in self.program.loops:
-            part = self._part(loop)
             phase = 2 * loop.number + 1
-            found.setdefault(self.bases[phase], []).append(f"{element_signal(part)}_valid")
-            for sent in self._sent_of(loop):
-                found.setdefault(self.bases[phase + 1] - 1, []).append(f"{sent.part.stream}_made_ready")
+            found.setdefault(self.bases[phase], []).append(f"{loop.stream.part.element}_valid")
+            for answer, sent in self._sent_of(loop):
+                ready = f"{sent.part.element}_ready"
+                condition = f"({ready} or {_dropped(answer)})" if _may_be_dropped(answer) else ready
+                found.setdefault(self.bases[phase + 1] - 1, []).append(condition)
         for item in self.schedule.issues.values():
             if item.unit.operator.has_wait:
                 step = self.bases[item.node.phase] + item.ready
@@ -312,21 +318,19 @@ class Writer:
         """Return the steps that are not followed by the next one: those around loops."""
         found = []
         for loop in self.program.loops:
-            part, phase = self._part(loop), 2 * loop.number + 1
+            part, phase = loop.stream.part, 2 * loop.number + 1
             first, after = self.bases[phase], self.bases[phase + 1]
-            found.append({"step": first - 1, "condition": f"unsigned({part.length}) = 0", "target": after})
-            found.append({"step": after - 1, "condition": f"{element_signal(part)}_last = '0'", "target": first})
+            if part.length:
+                found.append({"step": first - 1, "condition": f"unsigned({part.length}) = 0", "target": after})
+            found.append({"step": after - 1, "condition": f"{part.element}_last = '0'", "target": first})
         return found
 
-    def _part(self, loop: Loop) -> Part:
-        return next(part for _, part in self.streams if part.number == loop.number)
-
-    def _sent_of(self, loop: Loop) -> list[Sent]:
+    def _sent_of(self, loop: Loop) -> list[tuple[Answer, Sent]]:
         return [
-            sent
+            (answer, sent)
             for answer in self.program.answers
             for sent in answer.parts
-            if isinstance(sent.value, Produced) and sent.value.loop == loop.number
+            if isinstance(sent.value, Made) and sent.value.loop is loop
         ]
 
     def _loads(self) -> list[Context]:
@@ -379,28 +383,66 @@ class Writer:
 
     def _answer(self, number: int, answer: Answer) -> Context:
         side = answer.side
-        end = len(self.schedule.steps)
-        condition = self.value(answer.condition, end, 0)
-        is_conditional = not answer.condition.is_constant or not answer.condition.payload
+        condition = self._at_end(answer.condition)
         return {
             "prefix": side.prefix,
             "number": number,
             "is_fixed": side.is_fixed,
             "has_parts": not side.is_fixed,
             "condition": condition,
+            "segments_name": _own_signal("segments", answer),
             "segments_high": side.segments - 1,
-            "is_conditional": is_conditional,
+            "drops": [self._drop(answer)] if _may_be_dropped(answer) else [],
+            "is_conditional": _is_conditional(answer),
             "segments": [self._answer_segment(answer, segment) for segment in range(side.segments)],
-            "fields": [{"port": leaf.port, "values": self._field(answer.fields[leaf.port])} for leaf in side.leaves],
-            "lengths": [self._length(sent) for sent in answer.parts],
-            "passed": [self._passed(sent) for sent in answer.parts if isinstance(sent.value, Stream)],
-            "made": [self._made(sent) for sent in answer.parts if isinstance(sent.value, Produced)],
-            "empty": [sent.part.stream for sent in answer.parts if sent.value is None],
+            "wires": [{"to": to, "from": text} for to, text in self._wires(answer)],
+            "made": [
+                self._made(sent.part, sent.value)
+                for sent in answer.parts
+                if isinstance(sent.part, Part) and isinstance(sent.value, Made)
+            ],
         }
 
-    def _field(self, values: Sequence[Node]) -> str:
+    def _drop(self, answer: Answer) -> Context:
+        conditions = ["is_open", *self._valid(answer.condition), f"not {self._at_end(answer.condition)}"]
+        return {"name": _dropped(answer), "value": " and ".join(dict.fromkeys(conditions))}
+
+    def _at_end(self, node: Node) -> str:
+        """Return the expression of a value after the last step."""
+        return self.value(node, len(self.schedule.steps), 0)
+
+    def _wires(self, answer: Answer) -> Iterator[tuple[str, str]]:
+        """Yield the ports of an answer that one expression drives, each with the expression."""
         end = len(self.schedule.steps)
-        texts = [self._quiet(node, self.value(node, end, 0)) for node in values]
+        for leaf in answer.side.leaves:
+            yield leaf.port, self._field(answer.fields[leaf.port], end, 0)
+        if answer.side.length == "given":
+            source = next(side for side in self.program.inputs if side.frame.message == answer.side.frame.message)
+            yield f"{answer.side.prefix}payload_length", f"{source.prefix}payload_length"
+        for sent in answer.parts:
+            if sent.part.length:
+                yield sent.part.length, _length_text(length_of(sent))
+            if isinstance(sent.value, Stream):
+                dropped = f" or {_dropped(answer)}" if _may_be_dropped(answer) else ""
+                yield from _passed(sent.value.part, sent.part, dropped)
+            elif sent.value is None:
+                yield from _empty(_ports_of(sent.part))
+            elif isinstance(sent.part, Elements):
+                yield from self._made_message(sent.part, sent.value)
+
+    def _made_message(self, part: Elements, made: Made) -> Iterator[tuple[str, str]]:
+        """Yield the ports of an element that a loop makes."""
+        phase, last = 2 * made.loop.number + 1, self.schedule.steps[2 * made.loop.number + 1] - 1
+        for port, values in made.fields.items():
+            yield port, self._field(values, phase, last)
+        yield from _empty(part.inner)
+        valid = f"{made.loop.stream.part.element}_valid and to_bit_of(step_r = {self.bases[phase] + last})"
+        own = {"valid": valid, "last": f"{made.loop.stream.part.element}_last", "segment_valid": f"(others => {valid})"}
+        names = {item.name for item in part.ports}
+        yield from ((name, text) for signal, text in own.items() if (name := f"{part.element}_{signal}") in names)
+
+    def _field(self, values: Sequence[Node], phase: int, step: int) -> str:
+        texts = [self._quiet(node, self.value(node, phase, step)) for node in values]
         if len(texts) == 1 and values[0].kind != BOOL:
             return texts[0]
         # Element 0 is in the lowest bits.
@@ -412,13 +454,18 @@ class Writer:
 
     def _answer_segment(self, answer: Answer, segment: int) -> Context:
         conditions: dict[str, None] = {}
+        if _is_conditional(answer):
+            conditions |= dict.fromkeys([*self._valid(answer.condition), self._at_end(answer.condition)])
+        if not is_streamed(answer):
+            # Otherwise, an answer that waits for another one might be sent first, and both would wait.
+            return {"number": segment, "conditions": ["done", *conditions]}
         for leaf in answer.side.leaves:
             if leaf.segment == segment:
                 for node in answer.fields[leaf.port]:
                     conditions |= dict.fromkeys(self._valid(node))
         for sent in answer.parts:
-            if sent.part.segment == segment:
-                conditions |= dict.fromkeys(self._valid(_length_of(sent, self.program.loops)))
+            if sent.part.segment == segment or (segment == 0 and answer.side.length == "computed"):
+                conditions |= dict.fromkeys(self._valid(length_of(sent)))
         return {"number": segment, "conditions": [*conditions]}
 
     def _valid(self, node: Node | None) -> Iterator[str]:
@@ -436,60 +483,90 @@ class Writer:
         after = node.phase if node.operation == "final" else node.phase + 1
         yield f"to_bit_of(step_r >= {self.bases[after]})"
 
-    def _length(self, sent: Sent) -> Context:
-        node = _length_of(sent, self.program.loops)
-        text = "(others => '0')" if node is None else node.payload.port
-        return {"port": sent.part.length, "value": text}
-
-    def _passed(self, sent: Sent) -> Context:
-        assert isinstance(sent.value, Stream)
-        return {"to": sent.part.stream, "from": sent.value.name}
-
-    def _made(self, sent: Sent) -> Context:
-        assert isinstance(sent.value, Produced)
-        loop = next(item for item in self.program.loops if item.number == sent.value.loop)
-        phase = 2 * loop.number + 1
+    def _made(self, part: Part, made: Made) -> Context:
+        """Return the array of numbers that a loop makes."""
+        phase = 2 * made.loop.number + 1
         last = self.schedule.steps[phase] - 1
-        part = self._part(loop)
-        value = self._quiet(sent.value.element, self.value(sent.value.element, phase, last))
-        return {
-            "stream": sent.part.stream,
-            "bits": sent.part.bits,
-            "lanes": sent.part.bits // 8,
-            "value": value,
-            "step": self.bases[phase] + last,
-            "valid": f"{element_signal(part)}_valid",
-            "last": f"{element_signal(part)}_last",
-        }
-
-    def _input(self, part: Part) -> Context:
-        loop = next((item for item in self.program.loops if item.number == part.number), None)
-        passed = [
-            sent.part.stream
-            for answer in self.program.answers
-            for sent in answer.parts
-            if isinstance(sent.value, Stream) and sent.value.number == part.number
-        ]
-        step = self.bases[2 * part.number + 2] - 1 if loop else 0
+        ((node,),) = made.fields.values()
+        element = made.loop.stream.part.element
         return {
             "stream": part.stream,
-            "element": element_signal(part),
+            "element": part.element,
             "bits": part.bits,
             "lanes": part.bits // 8,
+            "value": self._quiet(node, self.value(node, phase, last)),
+            "step": self.bases[phase] + last,
+            "valid": f"{element}_valid",
+            "last": f"{element}_last",
+        }
+
+    def _input(self, part: Part | Elements) -> Context:
+        loop = next((item for item in self.program.loops if item.number == part.number), None)
+        passed = any(
+            isinstance(sent.value, Stream) and sent.value.number == part.number
+            for answer in self.program.answers
+            for sent in answer.parts
+        )
+        accepted = [port.name for port in _ports_of(part) if port.is_reverse and not passed]
+        ready = f"{part.element}_ready"
+        if loop:
+            accepted = [name for name in accepted if isinstance(part, Elements) and name != ready]
+        numbers = None
+        if loop and isinstance(part, Part):
+            numbers = {"element": part.element, "stream": part.stream, "bits": part.bits}
+        return {
+            "ready": ready,
+            "accepted": accepted,
             "is_looped": loop is not None,
-            "is_dropped": loop is None and not passed,
-            "step": step,
+            "step": self.bases[2 * part.number + 2] - 1 if loop else 0,
+            "numbers": numbers,
         }
 
 
-def _length_of(sent: Sent, loops: Iterable[Loop]) -> Node | None:
-    """Return the number of elements of a part of an answer, or None if it is empty."""
-    match sent.value:
-        case Stream(length=length):
-            return length
-        case Produced(loop=number):
-            return next(item.stream.length for item in loops if item.number == number)
-    return None
+def _is_conditional(answer: Answer) -> bool:
+    return not answer.condition.is_constant or not answer.condition.payload
+
+
+def _ports_of(part: Part | Elements) -> Sequence[MessagePort]:
+    """Return the ports of a string or an array, except for its length."""
+    if isinstance(part, Elements):
+        return part.ports
+    forward = {"tdata": 8, "tkeep": 1, "tvalid": None, "tlast": None}
+    ports = [MessagePort(f"{part.stream}_{signal}", width) for signal, width in forward.items()]
+    return [*ports, MessagePort(f"{part.stream}_tready", None, is_reverse=True)]
+
+
+def _may_be_dropped(answer: Answer) -> bool:
+    """Whether an answer is sent while the message is received, or not at all, in which case its parts are accepted."""
+    return is_streamed(answer) and _is_conditional(answer)
+
+
+def _dropped(answer: Answer) -> str:
+    return _own_signal("dropped", answer)
+
+
+def _own_signal(name: str, answer: Answer) -> str:
+    """Return the name of a signal of an answer, which never equals that of a port."""
+    return f"{name}_{answer.side.prefix.strip('_')}"
+
+
+def _passed(source: Part | Elements, part: Part | Elements, dropped: str) -> Iterator[tuple[str, str]]:
+    """Yield the connections of a part that is passed on."""
+    for taken, given in zip(_ports_of(source), _ports_of(part), strict=True):
+        yield (taken.name, f"{given.name}{dropped}") if taken.is_reverse else (given.name, taken.name)
+
+
+def _empty(ports: Iterable[MessagePort]) -> Iterator[tuple[str, str]]:
+    """Yield the values of the ports of an empty part."""
+    for port in ports:
+        if not port.is_reverse:
+            yield port.name, "'0'" if port.width is None else "(others => '0')"
+
+
+def _length_text(node: Node | None) -> str:
+    if node is None:
+        return "(others => '0')"
+    return f"std_logic_vector(to_unsigned({node.payload}, 32))" if node.is_constant else str(node.payload.port)
 
 
 def _may_be_odd(node: Node) -> bool:

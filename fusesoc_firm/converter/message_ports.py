@@ -238,12 +238,16 @@ def _ports(side: MessageSide, nodes: Sequence[Node], width: int, done: set[Path]
             case Data() if node.is_used:
                 yield from _stream_ports(side.stream(node), width)
             case Loop() if node.is_used:
-                ports = side.element(node)
                 if node.count is None:
-                    yield MessagePort(ports.length, LENGTH_BITS, f"{_words(node)}, its elements")
-                if has_bytes(node):
-                    yield from _ports(side, node.body, width, done)
-                    yield from _element_ports(ports)
+                    yield MessagePort(side.element(node).length, LENGTH_BITS, f"{_words(node)}, its elements")
+                yield from array_ports(side, node, width, done)
+
+
+def array_ports(side: MessageSide, loop: Loop, width: int, done: set[Path]) -> Iterator[MessagePort]:
+    """Yield the ports of an array of messages or strings except its length; `done` are leaves that have ports."""
+    if has_bytes(loop):
+        yield from _ports(side, loop.body, width, done)
+        yield from _element_ports(side.element(loop))
 
 
 def _words(part: Data | Loop) -> str:

@@ -13,7 +13,8 @@ from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import message_frame
 
 SCAN = message_frame("float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n")
-ANSWER = message_frame("float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nstring name\n")
+ANSWER = message_frame("float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nfloat32[] more\nstring name\n")
+_LOOP = "made = []\ntotal = 0.0\nfor r in m.ranges:\n    made.append(r)\n    total = total + r\n"
 
 # The body of a function of the message `m`, with '@' before the place of the fault; the message, and the remedy.
 BODIES = [
@@ -56,7 +57,6 @@ BODIES = [
     ("x = @m.ranges[2]", "an array of variable size is not stored", "loop over the array"),
     ("for a, b in zip(@m.ranges, m.heights):\n    pass", "an array of variable size is read once", "loop over"),
     ("for r in m.ranges:\n    pass\n@for r in m.ranges:\n    pass", "'ranges' is read twice", "one loop"),
-    ("if m.p:\n    @for r in m.ranges:\n        pass", "a loop over an array within 'if'", "'if' into the loop"),
     ("for r in m.ranges:\n    @for h in m.heights:\n        pass", "a loop over an array within another one", ""),
     ("for r in m.ranges:\n    if r > 1.0:\n        @break", "'break' in a loop over an array", "'if'"),
     ("for r in m.ranges:\n    if r > 1.0:\n        @return None", "'return' within a loop over an array", "set a name"),
@@ -81,6 +81,11 @@ RETURNS = [
     ("return {'i': m.low}", "'i' is an integer \\(int32\\), and the answer is a float32", "round\\(\\)"),
     ("return {'ranges': [m.low]}", "'ranges' is a list", "append"),
     ("return {'name': 'a'}", "'name' is a text", "pass one"),
+    ("return {'ranges': m.ranges, 'more': m.ranges}", "'ranges' is sent twice", "one place"),
+    ("return {'ranges': m.heights, 'more': m.ranges}", "'ranges' precedes 'more' in the answer", "one of both"),
+    (_LOOP + "return {'more': m.ranges}", "'ranges' is read by a loop and passed on", "append"),
+    (_LOOP + "return {'ranges': made, 'x': total}", "'x' precedes 'ranges' in the answer", "comes earlier"),
+    (_LOOP + "if total > 1.0:\n    return None\nreturn {'ranges': made}", "the condition of the answer", "earlier"),
 ]
 _HEAD = """import math
 
@@ -97,9 +102,9 @@ def tried(m):
 """
 
 
-def compiled(body: str) -> None:
+def compiled(body: str, length: str = "buffered") -> None:
     text = _HEAD + "".join(f"    {line}\n" for line in body.split("\n"))
-    compile_function(Task(Source("tried.py", text), "tried", [side_of("in_", SCAN)], [side_of("out_", ANSWER)]))
+    compile_function(Task(Source("tried.py", text), "tried", [side_of("in_", SCAN)], [side_of("out_", ANSWER, length)]))
 
 
 @pytest.mark.parametrize(("body", "message", "remedy"), BODIES)
@@ -124,6 +129,19 @@ def test_an_answer_is_refused(body: str, message: str, remedy: str) -> None:
     (fault,) = raised.value.diagnostics
     assert re.search(message, fault.message), fault.message
     assert re.search(remedy, fault.hint), fault.hint
+
+
+@pytest.mark.parametrize(
+    ("length", "answer", "message"),
+    [
+        ("computed", "{'ranges': m.ranges, 'more': m.heights}", "the length of 'more' precedes 'ranges'"),
+        ("given", "{'ranges': m.ranges, 'name': m.name}", "'more' has another length"),
+    ],
+)
+def test_a_length_that_comes_late_is_refused(length: str, answer: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        compiled(f"return {answer}", length)
+    assert "length: buffered" in raised.value.diagnostics[0].hint
 
 
 def test_a_recursion_is_refused_at_its_call() -> None:

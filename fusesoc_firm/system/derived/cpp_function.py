@@ -208,7 +208,7 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
 
 
 def check_streams(accelerator: AcceleratorType, faults: Diagnostics) -> None:
-    """Note messages of a function in C++ or Python that streams cannot carry, and further inputs of variable size."""
+    """Note messages of a function in C++ that streams cannot carry, and further inputs of variable size."""
     interface = accelerator.accelerator.interface
     name = accelerator.accelerator.name
     sides = (*accelerator.inputs, *accelerator.outputs)
@@ -217,12 +217,17 @@ def check_streams(accelerator: AcceleratorType, faults: Diagnostics) -> None:
             message = f"'{name}' has the type {accelerator.accelerator.type}, which supports only {problem}"
             hint = "write this accelerator in VHDL, or take messages without arrays of messages or strings"
             faults.error(message, item.message.source, hint)
+    check_varying(accelerator, faults)
+
+
+def check_varying(accelerator: AcceleratorType, faults: Diagnostics) -> None:
+    """Note inputs of variable size of a function, except for one."""
+    name, type_ = accelerator.accelerator.name, accelerator.accelerator.type
     varying = [number for number, side in enumerate(accelerator.inputs) if not side.frame.is_fixed_size]
     for number in varying[1:]:
-        message = (
-            f"'{name}' has the type {accelerator.accelerator.type}, which supports only one input of variable size"
-        )
-        faults.error(message, interface.input[number].message.source, "write this accelerator in VHDL")
+        message = f"'{name}' has the type {type_}, which supports only one input of variable size"
+        place = accelerator.accelerator.interface.input[number].message.source
+        faults.error(message, place, "write this accelerator in VHDL")
 
 
 def cpp_type(argument: Argument) -> str:

@@ -18,7 +18,7 @@ from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.system.derived.bypass import with_bypass
 from fusesoc_firm.system.derived.connections import Wiring, places
-from fusesoc_firm.system.derived.cpp_function import check_kernel, check_streams
+from fusesoc_firm.system.derived.cpp_function import check_kernel, check_varying
 from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.length import output_length
 from fusesoc_firm.system.derived.model import AcceleratorBlock, AcceleratorType, End, MessageSide, PayloadLength, Topic
@@ -179,7 +179,7 @@ class _Resolver:
             if (accelerator.is_software or accelerator.is_compiled) and accelerator.sources:
                 check_function(found, sources[0], self.faults)
             if accelerator.is_compiled:
-                check_streams(found.own, self.faults)
+                check_varying(found.own, self.faults)
             check_pins(found, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:

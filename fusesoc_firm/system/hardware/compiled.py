@@ -44,5 +44,8 @@ def program_of(type_: AcceleratorType, folder: Path) -> Program:
     path = type_.accelerator.sources[0]
     text = (folder / path).read_text(encoding="utf-8", errors="replace")
     numbers = KINDS[str(type_.accelerator.numbers)] if type_.accelerator.numbers else None
-    inputs, outputs = ([side_of(side.prefix, side.frame) for side in sides] for sides in (type_.inputs, type_.outputs))
+    inputs = [side_of(side.prefix, side.frame) for side in type_.inputs]
+    outputs = [
+        side_of(side.prefix, side.frame, *([side.length.source.value] if side.length else [])) for side in type_.outputs
+    ]
     return compile_function(Task(Source(shown_path(path), text), function_name(type_), inputs, outputs, numbers))

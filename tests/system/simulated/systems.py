@@ -68,8 +68,8 @@ class GeneratedSystem:
         self.work.analyse([self.folder / f"{self.entity}_tb.vhd"])
 
 
-def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
-    """A generator call for the specification `spec`."""
+def call(spec: Path, stimuli: Path, model: Path | None, **parameters: Plain) -> Request:
+    """A generator call for the specification `spec`; compiled functions need no model."""
     known: dict[str, Plain] = {
         "simulator": "ghdl",
         "board": None,
@@ -80,7 +80,7 @@ def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request
         "distro": None,
         **parameters,
     }
-    known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model), "product": "simulation"}
+    known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model) if model else None, "product": "simulation"}
     return Request("far", "test:sys:system-simulation:0", spec.parent, known)
 
 

@@ -1,0 +1,212 @@
+"""The answers of a compiled function: their fields, and the strings and arrays that they contain."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
+from typing import Any, NoReturn
+
+from fusesoc_firm.compiler.front import Interpreter
+from fusesoc_firm.compiler.graph import Node
+from fusesoc_firm.compiler.interface import Elements, Leaf, Part, Side, places
+from fusesoc_firm.compiler.kinds import Kind
+from fusesoc_firm.compiler.paths import Loop
+from fusesoc_firm.compiler.values import Array, Maybe, Produced, Record, Stream, Unbound, Value, converted, described
+from fusesoc_firm.frame.model import Fixed, all_nodes, names_of
+from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.text.diagnostics import nearest
+
+
+@dataclass
+class Made:
+    """An array of an answer that a loop makes: the elements' fields by port, or the element itself by its signal."""
+
+    loop: Loop
+    fields: dict[str, list[Node]]
+
+
+@dataclass
+class Sent:
+    """A string or an array of an answer: passed on from an input, made by a loop, or empty."""
+
+    part: Part | Elements
+    value: Stream | Made | None
+
+
+@dataclass
+class Answer:
+    """A message that the function returns: the condition to send it, its fields by port, and its parts."""
+
+    side: Side
+    condition: Node
+    fields: dict[str, list[Node]] = field(default_factory=dict)
+    parts: list[Sent] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class AnswerMaker:
+    """What makes the answers from the result of a function, whose definition is `node`."""
+
+    interpreter: Interpreter
+    node: ast.AST
+    outputs: Sequence[Side]
+
+    def _refuse(self, message: str, hint: str = "") -> NoReturn:
+        self.interpreter.refuse(self.node, message, hint)
+
+    def answers(self, value: Value) -> list[Answer]:
+        """Return the answers that a function's result contains, one for each output. May raise `InputError`."""
+        values = [value] if len(self.outputs) == 1 else self._several(value)
+        return [self._answer(side, value) for side, value in zip(self.outputs, values, strict=True)]
+
+    def _several(self, value: Value) -> Sequence[Value]:
+        if value is None:
+            return [None] * len(self.outputs)
+        if isinstance(value, Maybe) and isinstance(value.value, tuple):
+            value = tuple(Maybe(value.condition, item) for item in value.value)
+        if not isinstance(value, tuple) or len(value) != len(self.outputs):
+            self._refuse(
+                f"the function returns {described(value)}, not {len(self.outputs)} messages",
+                "return a tuple with a message, or None, for each output",
+            )
+        return value
+
+    def _answer(self, side: Side, value: Value) -> Answer:
+        condition = self.interpreter.graph.true()
+        while isinstance(value, Maybe):
+            condition, value = self.interpreter.graph.both(condition, value.condition), value.value
+        if value is None:
+            return Answer(
+                side,
+                self.interpreter.graph.constant(value=False),
+                self._fields(side, side.leaves, None),
+                [Sent(part, None) for part in side.parts],
+            )
+        if not isinstance(value, Record):
+            self._refuse(
+                f"the function returns {described(value)}, not a message",
+                "return {'field': value}, or None to send nothing",
+            )
+        self._check_names(side.frame.names, value)
+        fields = self._fields(side, side.leaves, value)
+        return Answer(side, condition, fields, [self._sent(side, part, value) for part in side.parts])
+
+    def _check_names(self, known: Any, value: Record, path: str = "") -> None:
+        for name, item in self.interpreter.memory.cells[value].items():
+            if name not in known:
+                self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
+            if isinstance(inner := item.value if isinstance(item, Maybe) else item, Record):
+                self._check_names(known[name], inner, f"{path}{name}.")
+
+    def _fields(self, side: Side, leaves: Sequence[Leaf], value: Value, skipped: int = 0) -> dict[str, list[Node]]:
+        """Return the fields of a message by their ports; `value` is that behind `skipped` steps of their paths."""
+        found: dict[str, list[Node]] = {}
+        graph = self.interpreter.graph
+        for leaf in leaves:
+            defaults = _defaults(side, leaf.path)
+            for element, steps in enumerate(places(leaf.path)):
+                condition, given = self._at(value, steps[skipped:])
+                fallback = converted(
+                    self.interpreter.graph,
+                    self.interpreter.graph.constant(defaults[element % len(defaults)]),
+                    leaf.kind,
+                )
+                node = fallback if given is None else self._field(given, leaf.kind, steps)
+                found.setdefault(leaf.port, []).append(graph.choose(condition, node, fallback))
+        return found
+
+    def _at(self, value: Value, steps: Sequence[str | int]) -> tuple[Node, Value]:
+        """Return the value at a path of an answer, or None without one, and the condition that it is there."""
+        condition = self.interpreter.graph.true()
+        for step in (*steps, None):
+            while isinstance(value, Maybe):
+                condition, value = self.interpreter.graph.both(condition, value.condition), value.value
+            if step is None or value is None:
+                break
+            if isinstance(value, tuple) and isinstance(step, int):
+                value = value[step] if step < len(value) else None
+            elif isinstance(value, Record | Array):
+                value = self.interpreter.memory.cells[value].get(step)
+            else:
+                self._refuse(f"field '{step}' is in {described(value)}, which has no fields")
+        return condition, value
+
+    def _field(self, value: Value, kind: Kind, steps: Sequence[str | int]) -> Node:
+        name = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
+        if isinstance(value, Unbound):
+            self._refuse(f"field '{name}' has no value on one of the paths", "give it one on each path")
+        if not isinstance(value, Node):
+            self._refuse(f"field '{name}' is {described(value)}, not a number")
+        if value.kind.is_float and not kind.is_float:
+            self._refuse(
+                f"field '{name}' is an integer ({kind}), and the answer is a {value.kind}",
+                "convert it with int() or round()",
+            )
+        made: Node = self.interpreter.checked(self.node, self.interpreter.arithmetic.to, value, kind)
+        return made
+
+    def _sent(self, side: Side, part: Part | Elements, value: Record) -> Sent:
+        condition, given = self._at(value, names_of(part.path))
+        name = dotted(names_of(part.path))
+        if not condition.is_constant and given is not None:
+            self._refuse(f"'{name}' is only in some answers", "send it always, or return None")
+        is_fixed = _count(part) is not None
+        match given:
+            case Stream() if not isinstance(part, Elements) or _shape(given.part) == part.shape:
+                return Sent(part, given)
+            case Produced(loop=number, element=element):
+                loop = next(item for item in self.interpreter.loops if item.number == number)
+                if not is_fixed or _count(loop.stream.part) == _count(part):
+                    return Sent(part, Made(loop, self._element(side, part, element)))
+            case None | "" if not is_fixed:
+                return Sent(part, None)
+            case Array() if not self.interpreter.memory.cells[given] and not is_fixed:
+                return Sent(part, None)
+        return self._refuse(
+            f"'{name}' is {described(given)}",
+            "pass one of the message on, or append to an empty list in a loop over an array",
+        )
+
+    def _element(self, side: Side, part: Part | Elements, value: Value) -> dict[str, list[Node]]:
+        """Return the fields of an element that a loop makes."""
+        names = names_of(part.path)
+        if isinstance(part, Part):
+            if part.kind is None:
+                self._refuse(f"'{dotted(names)}' is a text, and the loop makes numbers", "pass a text on")
+            return {part.stream: [self._field(value, part.kind, names)]}
+        if isinstance(value, Record):
+            self._check_names(reduce(getitem, names, side.frame.names), value, f"{dotted(names)}.")
+        for path in part.within:
+            _, given = self._at(value, names_of(path)[len(names) :])
+            if given not in (None, ""):
+                self._refuse(
+                    f"'{dotted(names_of(path))}' is a text or an array within an element, which loops do not make",
+                    "leave it out, or pass the whole array on",
+                )
+        return self._fields(side, part.leaves, value, len(names))
+
+
+def _defaults(side: Side, path: Any) -> list[Any]:
+    """Return the default values of a field's elements."""
+    leaf = next(item for item in _leaves(side) if item.path == path)
+    given = leaf.default
+    if given is None:
+        return [False if leaf.type.name == "bool" else 0]
+    return [*given] if isinstance(given, tuple) else [given]
+
+
+def _leaves(side: Side) -> Iterator[Any]:
+    for node in all_nodes(side.frame.nodes):
+        if isinstance(node, Fixed):
+            yield from node.fields
+
+
+def _shape(part: Part | Elements | None) -> object:
+    return part.shape if isinstance(part, Elements) else None
+
+
+def _count(part: Part | Elements) -> int | None:
+    return part.count if isinstance(part, Elements) else None

@@ -1,0 +1,107 @@
+"""Whether answers can be sent while a message is received: its strings and arrays pass once, in their order.
+
+A part of an answer that is passed on, or made by a loop, holds its source back until all that precedes the part in the
+answer is sent. So nothing that precedes it may depend on what comes after the source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from fusesoc_firm.compiler.answers import Answer, Made, Sent
+from fusesoc_firm.compiler.graph import Node
+from fusesoc_firm.compiler.interface import Side
+from fusesoc_firm.compiler.paths import Loop
+from fusesoc_firm.compiler.values import Stream
+from fusesoc_firm.frame.model import names_of
+from fusesoc_firm.frame.values import dotted
+
+_ONE = "an answer is sent while the message is received: send one of both"
+_BUFFERED = "write 'length: buffered' at the output, and a 'buffer' at the publisher"
+_EARLIER = (
+    "an answer is sent while the message is received: compute the value from what comes earlier, or omit one of both"
+)
+
+
+def source_of(sent: Sent) -> Stream | None:
+    """Return the string or array of the message that a part of an answer passes on, or is made of."""
+    return sent.value.loop.stream if isinstance(sent.value, Made) else sent.value
+
+
+def length_of(sent: Sent) -> Node | None:
+    """Return the number of elements of a part of an answer, or None if it is empty."""
+    source = source_of(sent)
+    return source.length if source else None
+
+
+def is_streamed(answer: Answer) -> bool:
+    """Whether the answer is sent while the message is received."""
+    return any(map(source_of, answer.parts))
+
+
+def problems(answers: Sequence[Answer], loops: Sequence[Loop], inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:
+    """Yield what would wait for ever, or be read twice, each with its remedy."""
+    looped = {loop.number for loop in loops}
+    streamed = [answer for answer in answers if is_streamed(answer)]
+    taken: set[int] = set()
+    for answer in streamed:
+        for sent in answer.parts:
+            source = source_of(sent)
+            if source is None:
+                continue
+            if source.number in looped and isinstance(sent.value, Stream):
+                yield f"'{source.path}' is read by a loop and passed on", "append the elements to a list in the loop"
+            if source.number in taken:
+                yield f"'{source.path}' is sent twice; its elements pass once", "send it in one place"
+            taken.add(source.number)
+    if len(streamed) > 1:
+        yield "two answers contain arrays or strings of the message", "send them in one answer"
+    for answer in answers:
+        if answer.side.length == "given":
+            yield from _lengths(answer, inputs)
+        yield from _waits(answer)
+
+
+def _lengths(answer: Answer, inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:
+    """Yield why the length of an answer is not that of a message."""
+    if all(side.is_fixed or side.frame.message != answer.side.frame.message for side in inputs):
+        yield f"the length of {answer.side.frame.message} is not known", _BUFFERED
+    for sent in answer.parts:
+        source = source_of(sent)
+        if source is None or source.path != _name(sent):
+            yield f"'{_name(sent)}' has another length than in the message", _BUFFERED
+
+
+def _waits(answer: Answer) -> Iterator[tuple[str, str]]:
+    """Yield the parts of an answer that precede what their values wait for."""
+    held = [(sent, source) for sent in answer.parts if (source := source_of(sent))]
+    for (before, first), (after, second) in pairwise(held):
+        if second.number < first.number:
+            order = f"'{_name(before)}' precedes '{_name(after)}' in the answer"
+            yield f"{order}, but '{first.path}' follows '{second.path}' in the message", _ONE
+    for name, segment, node, hint in _needs(answer):
+        for sent, source in held:
+            # A value that follows from the elements of array n has the phase 2n + 2.
+            if sent.part.segment >= segment and node.phase >= 2 * source.number + 2:
+                order = f"{name} precedes '{_name(sent)}' in the answer"
+                yield f"{order}, and depends on what follows '{source.path}' in the message", hint
+                break
+
+
+def _needs(answer: Answer) -> Iterator[tuple[str, int, Node, str]]:
+    """Yield the values of an answer: the name, the segment in which the value is sent, and a remedy if it is late."""
+    yield "the condition of the answer", 0, answer.condition, _EARLIER
+    for leaf in answer.side.leaves:
+        for node in answer.fields[leaf.port]:
+            yield f"'{dotted(names_of(leaf.path))}'", leaf.segment, node, _EARLIER
+    for sent in answer.parts:
+        if (length := length_of(sent)) is not None:
+            # The sum of all lengths precedes the first field.
+            is_first = answer.side.length == "computed"
+            segment, hint = (0, _BUFFERED) if is_first else (sent.part.segment, _EARLIER)
+            yield f"the length of '{_name(sent)}'", segment, length, hint
+
+
+def _name(sent: Sent) -> str:
+    return dotted(names_of(sent.part.path))

@@ -1,0 +1,171 @@
+"""Compiled functions of messages of variable size, within systems: loops, lists, strings, and messages that break."""
+
+from __future__ import annotations
+
+import random
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.seeds import seeded
+from tests.system.simulated.systems import GeneratedSystem, build, call
+
+_SEED = seeded(20261130)
+_MESSAGES = {
+    "Point": "float32 x\nfloat32 y\nfloat64[2] more\n",
+    "Named": "string name\nint16 weight\nPoint place\nuint8[] bytes\n",
+    "Cloud": "int32 first\nstring frame\nPoint[] points\nuint8[] colors\nNamed[] named\nPoint[3] corners\nint32 tail\n",
+    "Summary": "float32 nearest\nuint32 count\nint64 total\n",
+    "Points": "Point[] points\nint32 tail\nbool segments\nuint8 element_out_points\n",
+}
+# The types of the answers, the keys of the outputs, and the functions.
+_FUNCTIONS = {
+    "summary": (
+        "Summary",
+        "",
+        """
+class Summary:
+    def __init__(self):
+        self.total = 0
+        self.grid = [0] * 4
+
+    def __call__(self, m):
+        nearest = 1e9
+        for i, p in enumerate(m.points):
+            if p.x < nearest:
+                nearest = p.x
+            self.grid[i & 3] += 1
+        for n in m.named:
+            self.total += n.weight + int(n.place.y > 0.0)
+        return {"nearest": nearest, "count": self.grid[1], "total": self.total + m.tail}
+
+
+summary = Summary()
+""",
+    ),
+    "scaled": (
+        "Points",
+        "",
+        """
+def scaled(m):
+    points = []
+    for p in m.points:
+        points.append({"x": p.x * p.y, "y": -p.x, "more": [p.more[1], p.more[0] + m.first]})
+    return {"points": points, "tail": len(m.points) + m.tail}
+""",
+    ),
+    "coloured": (
+        "Points",
+        "",
+        """
+def coloured(m):
+    if m.first == 2:
+        return None
+    return {"points": [{"x": c / 4, "y": m.first} for c in m.colors], "tail": m.tail}
+""",
+    ),
+    "same": ("Cloud", "length: given", "def same(m):\n    return {**m, 'tail': m.tail * 3, 'first': len(m.frame)}\n"),
+    "partly": (
+        "Cloud",
+        "length: buffered",
+        """
+def partly(m):
+    return {
+        "first": m.first, "frame": m.frame, "points": [{"x": p.y, "y": p.x} for p in m.points],
+        "colors": [c ^ 255 for c in m.colors], "named": [{"weight": n.weight + 1} for n in m.named],
+        "corners": m.corners,
+    }
+""",
+    ),
+}
+
+
+def _specification(folder: Path, width: int, names: list[str]) -> Path:
+    types, blocks = [], []
+    for name in names:
+        answer, keys, text = _FUNCTIONS[name]
+        (folder / f"{name}.py").write_text(text, encoding="ascii")
+        output: dict[str, Any] = {"middleware": "ROS2", "message": f"demo_msgs/{answer}"}
+        sides = {"input": [{"middleware": "ROS2", "message": "demo_msgs/Cloud"}], "output": [output]}
+        output |= yaml.safe_load(keys) if keys else {}
+        types.append({"name": name, "type": "Python", "sources": f"{name}.py", "interface": sides})
+        end = {"middleware": "ROS2", "name": f"{name}_out", "mode": "publisher", "message": f"demo_msgs/{answer}"}
+        blocks += [
+            {"middleware": "ROS2", "name": f"{name}_in", "mode": "subscriber", "message": "demo_msgs/Cloud",
+             "outgoing": [{"name": f"{name}_b"}]},
+            {"name": f"{name}_b", "type": name, "outgoing": [{"name": f"{name}_out"}]},
+            {**end, "buffer": 4096} if "buffered" in keys else end,
+        ]  # fmt: skip
+    path = folder / "arrays.yaml"
+    text = yaml.safe_dump({"project": {"name": "arrays", "width": width}, "accelerators": types, "blocks": blocks})
+    path.write_text(text, encoding="ascii")
+    return path
+
+
+def _cloud(source: random.Random) -> dict[str, Any]:
+    def number() -> float:
+        return source.choice([0.0, -0.0, float("nan"), float("inf"), source.uniform(-9, 9)])
+
+    def point() -> dict[str, Any]:
+        return {"x": number(), "y": number(), "more": [number(), number()]}
+
+    def named() -> dict[str, Any]:
+        name = "n" * source.randrange(6)
+        weight, data = source.randrange(-9, 9), [source.randrange(256) for _ in range(source.randrange(4))]
+        return {"name": name, "weight": weight, "place": point(), "bytes": data}
+
+    return {
+        "first": source.randrange(3),
+        "frame": "f" * source.choice([0, 1, 2, 3, 9]),
+        "points": [point() for _ in range(source.choice([0, 1, 2, 7]))],
+        "colors": [source.randrange(256) for _ in range(source.choice([0, 1, 3, 4, 17]))],
+        "named": [named() for _ in range(source.choice([0, 1, 3]))],
+        "corners": [point() for _ in range(3)],
+        "tail": source.randrange(-99, 99),
+    }
+
+
+def _built(folder: Path, width: int, names: list[str], clouds: list[dict[str, Any]]) -> GeneratedSystem:
+    package = folder / "demo_msgs" / "msg"
+    package.mkdir(parents=True)
+    for name, text in _MESSAGES.items():
+        (package / f"{name}.msg").write_text(text, encoding="ascii")
+    sent = [{f"{name}_in": cloud} for cloud in clouds for name in names]
+    (folder / "stimuli.yaml").write_text(yaml.safe_dump(sent), encoding="ascii")
+    spec = _specification(folder, width, names)
+    # The functions are the model.
+    request = call(spec, folder / "stimuli.yaml", None, paths=["demo_msgs"])
+    return build(request, folder / "work", "acc/cordic/cordic", "acc/float/float", "acc/python/python")
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("width", [8, 64])
+def test_functions_of_arrays_answer_as_python_does(width: int, tmp_path: Path) -> None:
+    print("seed", _SEED + width)
+    source = random.Random(_SEED + width)
+    made = _built(tmp_path, width, [*_FUNCTIONS], [_cloud(source) for _ in range(5)])
+    for name in _FUNCTIONS:
+        assert made.work.latches(name, {}) == []
+    for stalls in (0, 40):
+        assert made.passes(SEED=_SEED, STALL_PERCENT=stalls)
+
+
+@pytest.mark.check
+def test_a_broken_message_has_no_answer_and_changes_no_state(tmp_path: Path) -> None:
+    print("seed", _SEED)
+    source = random.Random(_SEED)
+    made = _built(tmp_path, 8, ["summary"], [_cloud(source) for _ in range(6)])
+    stimuli, answers = made.folder / "stimulus.txt", made.folder / "expected.txt"
+    frames = re.split(r"^> .*\n", stimuli.read_text(encoding="ascii"), flags=re.MULTILINE)[1:]
+    sent = ""
+    for number, frame in enumerate(frames):
+        data = bytes.fromhex(frame)
+        sent += f"> broken\n  {data[: source.randrange(6, len(data))].hex()}\n> {number}\n  {data.hex()}\n"
+    stimuli.write_text(sent, encoding="ascii")
+    later = re.sub(r"^< @(\d+)", lambda found: f"< @{2 * int(found[1]) + 1}", answers.read_text(), flags=re.MULTILINE)
+    answers.write_text(f"! frame_error {len(frames)}\n{later}", encoding="ascii")
+    for stalls in (0, 40):
+        assert made.passes(SEED=_SEED, STALL_PERCENT=stalls)
