@@ -27,6 +27,7 @@ def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> Non
     assert outcome.is_proved, outcome.log
 
 
+@pytest.mark.one_in(5, 5)
 @pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "mutation", "label"), _FAULTS, ids=[f"{p.name}-{label}" for p, _, label in _FAULTS])
