@@ -6,7 +6,6 @@ import math
 import random
 import re
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ FLOAT = CORES / "acc" / "float"
 COUNT = 3000
 # Of operations that take about 100 cycles.
 MOST = 10_000
-COUNTS = [100, pytest.param(MOST, marks=pytest.mark.thorough)]
 # GHDL's memory grows with the cycles of the filter and of the controller, so their samples are in several runs.
 PIECE = 500
 PIECES = [0, *(pytest.param(piece, marks=pytest.mark.thorough) for piece in range(1, MOST // PIECE + 1))]
@@ -135,35 +133,6 @@ def test_conversions_between_sizes_are_those_of_numpy(library: Library, tmp_path
     found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="resize", **size_of(numbers), **size)
     with np.errstate(all="ignore"):
         check(results, rows, found, numbers.values(row[0] for row in rows).astype(TYPES[other]))
-
-
-@pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.parametrize(("name", "fraction"), [("float64", 58), ("float32", 30)])
-def test_sine_and_cosine_are_within_the_stated_error(
-    library: Library, tmp_path: Path, name: str, fraction: int, count: int
-) -> None:
-    numbers = Numbers(name)
-    rows = numbers.several(count // 10, 1)
-    while len(rows) < count:
-        # Up to half a turn, or up to the largest legal angle, often beside a quarter turn.
-        angle = numbers.random.uniform(-1, 1) * numbers.random.choice((math.pi, 2.0**16))
-        if numbers.random.random() < 0.2:
-            angle = round(angle / (math.pi / 2)) * math.pi / 2
-        rows.append([int(TYPES[name](angle).view(BITS[name]))])
-    generics = {**size_of(numbers), "FRACTION": fraction}
-    found, _ = operate(library, tmp_path, numbers.width, rows, OPERATION="sincos", **generics)
-    pairs = [numbers.values((bits >> numbers.width, bits & (1 << numbers.width) - 1)) for bits in found]
-    for row, pair in zip(rows, pairs, strict=True):
-        angle = float(numbers.values(row)[0])
-        if math.isnan(angle) or abs(angle) >= 2**16:
-            assert all(map(math.isnan, pair)), angle
-            continue
-        for result, exact in zip(pair, MODEL.sine_and_cosine(angle), strict=True):
-            ulp = Fraction(float(np.spacing(np.abs(result))))
-            error = abs(Fraction(float(result)) - exact)
-            assert error <= Fraction(5, 2**fraction) + ulp / 2, (angle, float(result), float(error))
-            if abs(exact) >= Fraction(1, 2):
-                assert error <= ulp, (angle, float(result), float(error / ulp))
 
 
 def samples(numbers: Numbers, operands: int, count: int) -> list[list[int]]:
@@ -294,17 +263,27 @@ def measured(library: Library, folder: Path, form: Form, bits: int, count: int, 
     return map(int, re.findall(r"\d+", report.splitlines()[-1]))
 
 
+def bits_of(form: Form, number: float) -> int:
+    return int(TYPES[form.size](number).view(BITS[form.size]))
+
+
+def usual(form: Form) -> int:
+    """Operands whose latency is not an exception: those of an angle below 2**10 take longer than those of 0."""
+    return bits_of(form, 1000.0) if form.operator == "sincos" else 0
+
+
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("form", FORMS, ids=str)
 def test_latency_and_throughput(library: Library, tmp_path: Path, form: Form) -> None:
-    latency, cycles = measured(library, tmp_path, form, 0, 50)
+    latency, cycles = measured(library, tmp_path, form, usual(form), 50)
     assert latency == form.latency(32)
     assert cycles == latency + form.facts["interval"] * 49 + 1
 
 
 @pytest.mark.parametrize("form", [form for form in FORMS if "longest" in form.facts], ids=str)
 def test_the_longest_latency_is_that_of_the_smallest_numbers(library: Library, tmp_path: Path, form: Form) -> None:
-    latency, _ = measured(library, tmp_path, form, 1, 1)
+    """The longest one of sine and cosine is that of the largest angles."""
+    latency, _ = measured(library, tmp_path, form, bits_of(form, 2.0**127) if form.operator == "sincos" else 1, 1)
     assert latency == form.facts["longest"]
 
 
@@ -347,8 +326,6 @@ def test_netlists_have_no_latches_and_the_same_results(library: Library, tmp_pat
     count = 10 if operation in ("sincos", "atan2", "exp", "log", "low_pass", "pid") else 300
     rows = random.Random(SEED).sample(numbers.several(2000, OPERANDS.get(operation, 1)), count)
     sizes = size_of(numbers)
-    if operation == "sincos":
-        sizes["FRACTION"] = 30
     results, _ = operate(library, tmp_path, 32, rows, OPERATION=operation, **sizes)
     assert library.latches(ENTITIES[operation], sizes) == []
     netlist = Library("firm", tmp_path)

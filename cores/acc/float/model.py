@@ -61,16 +61,78 @@ def clamp(number: float, low: float, high: float) -> float:
     return min(max(number, low, key=_order), high, key=_order)
 
 
-def sine_and_cosine(angle: float) -> tuple[Fraction, Fraction]:
-    """Return sine and cosine of an angle in rad, with an error below 1e-36."""
-    turns = round(Fraction(angle) / (2 * PI))
-    # To 2**-160, so that the powers remain short.
-    rest = Fraction(round((Fraction(angle) - turns * 2 * PI) * 2**160), 2**160)
-    term, sums = Fraction(1), [Fraction(1), Fraction(0)]
-    for k in range(1, 60):
-        term = Fraction(round(term * rest / k * 2**160), 2**160)
-        sums[k % 2] += term if k % 4 < 2 else -term
-    return sums[1], sums[0]
+def sine_and_cosine(angle: float, size: Format = FLOAT64) -> tuple[float, float]:
+    """Return sine and cosine of an angle in rad, as `firm_float_sincos`: within a unit of the last place."""
+    if not math.isfinite(angle):
+        return math.nan, math.nan
+    last = (size.mantissa_bits + 3) // 2
+    if not angle or _exponent(abs(Fraction(angle))) < -last:
+        return angle, 1.0
+    quadrant, z, first = _quarter_turns(abs(angle), size)
+    sine, cosine = _turned(z, first, size)
+    # The magnitude of a negative sine is one less.
+    unit = Fraction(1, 2 ** (size.mantissa_bits // 2 * 2 + 8))
+    y = (sine if sine >= 0 else sine + 1) * unit / 2**first
+    x = cosine * unit
+    for _ in range(quadrant):
+        y, x = x, -y
+    return math.copysign(1.0, angle) * size.rounded(y), size.rounded(x)
+
+
+def sin(angle: float, size: Format = FLOAT64) -> float:
+    """Return the sine of an angle in rad, as `firm_float_sincos`."""
+    return sine_and_cosine(angle, size)[0]
+
+
+def cos(angle: float, size: Format = FLOAT64) -> float:
+    """Return the cosine of an angle in rad, as `firm_float_sincos`."""
+    return sine_and_cosine(angle, size)[1]
+
+
+def _quarter_turns(angle: float, size: Format) -> tuple[int, int, int]:
+    """Return the nearest multiple of a quarter turn, modulo 4, and the distance from it: its units, and an exponent s.
+
+    A unit is 2**-s of the last place.
+    """
+    fraction, low = size.mantissa_bits // 2 * 2 + 8, size.mantissa_bits + 3
+    half = _exponent(Fraction(angle)) // 2
+    mantissa = int(Fraction(angle) / Fraction(4) ** half * 2**size.mantissa_bits)
+    index = max(half - (size.mantissa_bits + 1) // 2, 1)
+    # The last digit has the weight 4**-place in the mantissa's place.
+    place = index - half
+    z = tail = carry = quadrant = 0
+    is_complete = False
+    while not is_complete:
+        first = 2 * place - fraction - 3
+        is_complete = first >= 1 and z >> (fraction - 4) not in (0, -1)
+        if place == 5:
+            quadrant = ((z + 16) >> 5) % 4
+            z = (z + 16) % 32 - 16
+        z = 4 * (z + carry) + (tail >> (low - 2))
+        # Before the quadrant is known, only its bits and those below matter.
+        z = z % 2**7 if place < 5 else z
+        product = 4 * tail % 2**low + mantissa * _digits_of_two_over_pi()[index]
+        carry, tail = product >> low, product % 2**low
+        index, place = index + 1, place + 1
+    return quadrant, z, first
+
+
+def _turned(z: int, first: int, size: Format) -> tuple[int, int]:
+    """Return sine and cosine of an angle of z quarter turns, all times 2**first; they have units of the last place."""
+    fraction, last = size.mantissa_bits // 2 * 2 + 8, (size.mantissa_bits + 3) // 2
+    signs = []
+    for index in range(first, last + 1):
+        signs.append(1 if z >= 0 else -1)
+        z = 2 * (z - signs[-1] * _scaled(_turn(index), fraction))
+    sine = z
+    for distance, sign in _terms(min(first, 31) if first <= last else 31):
+        if distance <= fraction - 2 - len(signs):
+            sine += sign * (z >> distance)
+    cosine = _scaled(_inverse_gain(first), fraction) if first <= last else 2**fraction
+    for index in range(last, first - 1, -1):
+        sign = signs.pop()
+        sine, cosine = (sine >> 1) + sign * cosine, cosine - sign * (sine >> (2 * index + 1))
+    return sine, cosine
 
 
 def atan2(y: float, x: float, size: Format = FLOAT64) -> float:
@@ -275,6 +337,68 @@ def _inner(number: float, size: Format) -> tuple[int, int]:
     """Return mantissa and exponent of a positive number; the mantissa has five bits more."""
     exponent = _exponent(Fraction(number))
     return int(Fraction(number) / Fraction(2) ** exponent * 2 ** (size.mantissa_bits + 5)), exponent
+
+
+# Constants of sine and cosine are rounded to these fraction bits first, as in `firm_float_turn_table`.
+_WORD = 96
+_PI_DIGITS = 576
+
+
+@cache
+def _pi(fraction: int) -> int:
+    """Return pi in units of 2**-fraction, rounded down."""
+    # Machin's formula, with 32 bits more for the errors of all terms.
+    unit = 2 ** (fraction + 32)
+    angles = [sum((-1) ** k * (unit // x ** (2 * k + 1)) // (2 * k + 1) for k in range(fraction)) for x in (5, 239)]
+    return 4 * (4 * angles[0] - angles[1]) >> 32
+
+
+@cache
+def _digits_of_two_over_pi() -> tuple[int, ...]:
+    """Return the digits of 2/pi to the base 4, from -1 to 2; the digit k has the weight 4**-k."""
+    fraction = 2 * _PI_DIGITS
+    rest = 2 ** (2 * fraction + 1 + 32) // _pi(fraction + 32)
+    digits = []
+    for _ in range(_PI_DIGITS):
+        digits.append((rest + 1) % 4 - 1)
+        rest = (rest - digits[-1]) // 4
+    return (rest, *reversed(digits), *[0] * _PI_DIGITS)
+
+
+@cache
+def _turn(index: int) -> int:
+    """Return 2**index * atan(2**-index) in quarter turns, in words' units."""
+    return round(_arctangent(index, 2 * _WORD + index) / PI * 2 / Fraction(2) ** _WORD)
+
+
+@cache
+def _squared_gain(index: int) -> Fraction:
+    """Return the product of 1 + 4**-i over all i >= index, with an error below 2**-240."""
+    unit = 2**250
+    product = unit
+    for i in range(index, 125):
+        product += product // 4**i
+    return Fraction(product, unit)
+
+
+@cache
+def _inverse_gain(index: int) -> int:
+    """Return the inverse of the gain of all rotations from an angle on, in words' units."""
+    return round(Fraction(math.isqrt(round(2**400 / _squared_gain(index))), 2 ** (200 - _WORD)))
+
+
+@cache
+def _terms(index: int) -> tuple[tuple[int, int], ...]:
+    """Return pi/2 times the inverse of the gain, less 1, as shifts and signs: the digits of the non-adjacent form."""
+    root = math.isqrt(round(2**400 / _squared_gain(index)))
+    number = round(Fraction(root, 2**200) * PI / 2 * 2**_WORD) - 2**_WORD
+    digits = ((_WORD + 1 - place, (3 * number >> place & 1) - (number >> place & 1)) for place in range(_WORD, 0, -1))
+    return tuple((distance, sign) for distance, sign in digits if sign)
+
+
+def _scaled(word: int, fraction: int) -> int:
+    """Return a word as the nearest number of units of 2**-fraction."""
+    return (word + 2 ** (_WORD - fraction - 1)) >> (_WORD - fraction)
 
 
 @cache

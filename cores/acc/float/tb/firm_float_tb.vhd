@@ -20,7 +20,7 @@ entity firm_float_tb is
     -- Of the result of resize.
     OUT_EXPONENT_BITS : positive := 8;
     OUT_MANTISSA_BITS : positive := 23;
-    -- Of fixed-point numbers; FRACTION also of sincos.
+    -- Of fixed-point numbers.
     WIDTH             : positive := 32;
     FRACTION          : natural  := 0;
     IS_SIGNED         : boolean  := true;
@@ -317,8 +317,7 @@ begin
     u_dut : entity firm.firm_float_sincos
       generic map (
         EXPONENT_BITS => EXPONENT_BITS,
-        MANTISSA_BITS => MANTISSA_BITS,
-        FRACTION      => FRACTION
+        MANTISSA_BITS => MANTISSA_BITS
       )
       port map (
         clk        => clk,
