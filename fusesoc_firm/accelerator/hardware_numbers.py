@@ -199,6 +199,15 @@ def _angle(y: Any, x: Any) -> Any:
     return _modelled("atan2")(y, x)
 
 
+def _tangent(value: Any) -> Any:
+    return _real(np.divide, _modelled("sin")(value), _modelled("cos")(value))
+
+
+def _of_numpy(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function of one number as NumPy has it: the result for a number of Python is a float64."""
+    return lambda value: function(value if isinstance(value, np.floating) else np.float64(value))
+
+
 def _other_leg(value: Any) -> Any:
     return square_root((1.0 - value) * (1.0 + value))
 
@@ -215,8 +224,14 @@ _MATH: Mapping[str, Callable[..., Any]] = {
     "atan": lambda value: _angle(value, 1.0),
     "asin": lambda value: _angle(value, _other_leg(value)),
     "acos": lambda value: _angle(_other_leg(value), value),
+    "sin": _modelled("sin"),
+    "cos": _modelled("cos"),
+    "tan": _tangent,
     "exp": _modelled("exp"),
     "log": _modelled("log"),
+}
+_NUMPY: Mapping[str, Callable[..., Any]] = {
+    name: _of_numpy(_MATH[name]) for name in ("sin", "cos", "tan", "exp", "log")
 }
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
     "int": lambda value=0: _whole(value, int) if isinstance(value, float | np.floating) else int(value),
@@ -225,13 +240,13 @@ _BUILTINS: Mapping[str, Callable[..., Any]] = {
 
 
 def adopt(module: ModuleType) -> None:
-    """Give a module the functions of hardware in place of those of Python and `math`."""
-    own = SimpleNamespace(**{**vars(math), **_MATH})
-    replaced = {id(getattr(math, name)): function for name, function in _MATH.items()}
+    """Give a module the functions of hardware in place of those of Python, `math` and NumPy."""
+    replaced: dict[int, Any] = {}
+    for library, functions in ((math, _MATH), (np, _NUMPY)):
+        replaced |= {id(getattr(library, name)): function for name, function in functions.items()}
+        replaced[id(library)] = SimpleNamespace(**{**vars(library), **functions})
     for name, value in [*vars(module).items()]:
-        if value is math:
-            setattr(module, name, own)
-        elif id(value) in replaced:
+        if id(value) in replaced:
             setattr(module, name, replaced[id(value)])
     for name, function in _BUILTINS.items():
         vars(module).setdefault(name, function)

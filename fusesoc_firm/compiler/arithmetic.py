@@ -16,7 +16,18 @@ from typing import Any
 import numpy as np
 
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.kinds import BOOL, FLOAT, FLOAT32, FLOAT64, INT, INTEGERS, Kind, number_of, result_kind
+from fusesoc_firm.compiler.kinds import (
+    BOOL,
+    FLOAT,
+    FLOAT32,
+    FLOAT64,
+    INT,
+    INTEGERS,
+    Kind,
+    number_of,
+    pair_of,
+    result_kind,
+)
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.compiler.values import UnmergeableError, common_kind, converted
 
@@ -323,6 +334,10 @@ class Arithmetic:
             return value
         return self._to(value, FLOAT)
 
+    def of_numpy(self, value: Node) -> Node:
+        """Return the operand of a function of NumPy: a float32 remains one, every other number is NumPy's float64."""
+        return value if value.kind == FLOAT32 else self._to(self.real(value), FLOAT64)
+
     def square_root(self, value: Node) -> Node:
         """Return the square root; NaN for negative numbers, as in NumPy."""
         operand = self.real(value)
@@ -344,6 +359,26 @@ class Arithmetic:
         if all(item.is_constant for item in operands):
             return self.graph.constant(number_of(kind, modelled(name, kind, *(item.payload for item in operands))))
         return self.graph.node(name, operands, kind)
+
+    def sine(self, value: Node) -> Node:
+        """Return `math.sin(value)`."""
+        return self._of_angle("sin", "sine", value)
+
+    def cosine(self, value: Node) -> Node:
+        """Return `math.cos(value)`."""
+        return self._of_angle("cos", "cosine", value)
+
+    def tangent(self, value: Node) -> Node:
+        """Return `math.tan(value)`, as the quotient of sine and cosine."""
+        return self.binary(ast.Div, self.sine(value), self.cosine(value))
+
+    def _of_angle(self, name: str, part: str, value: Node) -> Node:
+        """Return one of the results of the operator for both."""
+        angle = self.real(value)
+        if angle.is_constant:
+            return self.graph.constant(number_of(angle.kind, modelled(name, angle.kind, angle.payload)))
+        both = self.graph.node("sincos", (angle,), pair_of(angle.kind))
+        return self.graph.node(part, (both,), angle.kind)
 
     def angle(self, value: Node) -> Node:
         """Return `math.atan(value)`."""

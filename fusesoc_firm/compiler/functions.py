@@ -47,6 +47,10 @@ def _one(name: str) -> Call:
     return Call(1, 1, lambda arithmetic, values: getattr(arithmetic, name)(values[0]))
 
 
+def _of_numpy(name: str) -> Call:
+    return Call(1, 1, lambda arithmetic, values: getattr(arithmetic, name)(arithmetic.of_numpy(values[0])))
+
+
 def _typed(name: str) -> Call:
     return Call(1, 1, lambda arithmetic, values: arithmetic.to(values[0], KINDS[name]))
 
@@ -74,10 +78,18 @@ CALLS: Mapping[str, Call] = MappingProxyType(
         "math.atan2": Call(2, 2, lambda arithmetic, values: arithmetic.function("atan2", *values)),
         "math.exp": Call(1, 1, lambda arithmetic, values: arithmetic.function("exp", *values)),
         "math.log": Call(1, 1, lambda arithmetic, values: arithmetic.function("log", *values)),
+        "math.sin": _one("sine"),
+        "math.cos": _one("cosine"),
+        "math.tan": _one("tangent"),
         "math.atan": _one("angle"),
         "math.asin": _one("arc_sine"),
         "math.acos": _one("arc_cosine"),
         "math.hypot": Call(1, _ANY, lambda arithmetic, values: arithmetic.length(values)),
+        "numpy.sin": _of_numpy("sine"),
+        "numpy.cos": _of_numpy("cosine"),
+        "numpy.tan": _of_numpy("tangent"),
+        "numpy.exp": Call(1, 1, lambda arithmetic, values: arithmetic.function("exp", arithmetic.of_numpy(values[0]))),
+        "numpy.log": Call(1, 1, lambda arithmetic, values: arithmetic.function("log", arithmetic.of_numpy(values[0]))),
         "numpy.abs": _one("absolute"),
         "numpy.absolute": _one("absolute"),
         **{f"math.{name}": call for name, call in _SHARED.items()},

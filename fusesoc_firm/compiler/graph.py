@@ -5,7 +5,10 @@
 | constant | - | `payload`, the number |
 | input | - | the bits of a port that `payload` names |
 | state, carried, final | - | a register: of a state, of a value between the elements of a loop, and after the loop |
-| add, subtract, multiply, divide, square_root, sine, cosine | numbers of the result's kind | correctly rounded |
+| add, subtract, multiply, divide, square_root | numbers of the result's kind | correctly rounded |
+| atan2, exp, log | floats of the result's kind | that of the operator's model |
+| sincos | a float | a pair: its sine and its cosine, those of the operator's model |
+| sine, cosine | the pair | one of its numbers |
 | to_float, to_integer, resize | a number of another kind | the nearest number; towards zero |
 | less, at_most, equal | two numbers of one kind, or integers | a truth value |
 | negate, absolute, copy_sign | floats | by bits |

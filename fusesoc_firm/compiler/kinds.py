@@ -61,6 +61,11 @@ INTEGERS = {
 KINDS = {kind.name: kind for kind in (BOOL, FLOAT32, FLOAT64, *INTEGERS.values())}
 
 
+def pair_of(kind: Kind) -> Kind:
+    """Return the kind of two floats that one operator computes; no variable has it."""
+    return Kind(f"{kind}_pair", 2 * kind.bits, is_float=True)
+
+
 def is_number(value: object) -> bool:
     """Whether a value is a number or a truth value that hardware can hold."""
     return isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating)

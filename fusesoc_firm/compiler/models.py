@@ -11,9 +11,6 @@ from typing import Any
 from fusesoc_firm.compiler.kinds import Kind
 from fusesoc_firm.tools.library_path import library_root
 
-MODELLED = ("atan2", "exp", "log")
-"""The functions with models."""
-
 _MODULE = "_firm_float_model"
 
 

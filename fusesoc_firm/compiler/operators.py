@@ -12,7 +12,6 @@ import yaml
 
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import Kind
-from fusesoc_firm.compiler.models import MODELLED
 from fusesoc_firm.tools.library_path import library_root
 
 # The operations of the graph that are operators, each with the operator's name.
@@ -24,7 +23,7 @@ _NAMES = {
     "to_float": "from_fixed",
     "to_integer": "to_fixed",
     "resize": "resize",
-    **{name: name for name in MODELLED},
+    **{name: name for name in ("atan2", "exp", "log", "sincos")},
 }
 # The widths of integers that are converted; one operator converts all that are not wider.
 _WIDTHS = (32, 64, 65)
@@ -34,17 +33,18 @@ SHORT = "short"
 
 @dataclass(frozen=True)
 class Operator:
-    """An entity that computes one operation: the generics, the ports of the operands, and the port of the result.
+    """An entity that computes one operation: the generics, and the ports of the operands and of the result.
 
-    The result is there `latency` cycles after its operands. With `has_wait`, one result is computed at a time, and it
-    may be later. `width` is the bits of the result, and `operand` those of the operands.
+    The ports of the result have the same width, and the first one is in the lowest bits. The result is there `latency`
+    cycles after its operands. With `has_wait`, one result is computed at a time, and it may be later. `width` is the
+    bits of the result, and `operand` those of the operands.
     """
 
     operation: str
     entity: str
     generics: tuple[tuple[str, str], ...]
     inputs: tuple[str, ...]
-    output: str
+    outputs: tuple[str, ...]
     latency: int
     has_wait: bool
     width: int
@@ -71,7 +71,7 @@ def is_operator(node: Node) -> bool:
 
 def operator_of(node: Node, form: str = SHORT) -> Operator:
     """Return the operator that computes a node; `form` is preferred, if the operator has it."""
-    of_operand = node.operation in ("to_integer", "resize")
+    of_operand = node.operation in ("to_integer", "resize", "sincos")
     size = node.operands[0].kind if of_operand else node.kind
     description = _table()[_NAMES[node.operation]]
     forms = description["forms"]
@@ -81,12 +81,13 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
     if not isinstance(latency, int):
         latency = next(cycles for most, cycles in latency.items() if width <= most)
     ports = tuple(name for name, type_ in description["inputs"].items() if type_ != "bit")
+    results = tuple(description["outputs"]) if node.operation == "sincos" else (next(iter(description["outputs"])),)
     return Operator(
         node.operation,
         description["entity"],
         (*((name, str(value).lower()) for name, value in facts["generics"].items()), *generics),
         ports,
-        next(iter(description["outputs"])),
+        results,
         latency,
         facts["interval"] != 1,
         width if node.operation == "to_integer" else node.kind.bits,

@@ -11,7 +11,7 @@ from fusesoc_firm.compiler.binding import Binding, Register
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.interface import Elements, Part
 from fusesoc_firm.compiler.kinds import BOOL, INT, bits_of
-from fusesoc_firm.compiler.operators import is_operator
+from fusesoc_firm.compiler.operators import Operator, is_operator
 from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.schedule import TRANSPARENT, Issue, Unit
 from fusesoc_firm.compiler.streaming import is_streamed, length_of
@@ -129,6 +129,10 @@ class Writer:
                 return f"negated({given[0]})"
             case "absolute":
                 return f"magnitude({given[0]})"
+            case "sine" | "cosine":
+                # A pair is a signal; the sine is in its lowest bits.
+                low = node.bits if node.operation == "cosine" else 0
+                return f"{given[0]}({low + node.bits - 1} downto {low})"
             case "copy_sign":
                 return f"with_sign_of({given[0]}, {given[1]}, {node.kind.exponent_bits})"
             case "invert" if node.kind == BOOL:
@@ -277,7 +281,7 @@ class Writer:
                 {"port": port, "signal": signal}
                 for port, signal in zip(operator.inputs, self._operand_names(unit), strict=True)
             ],
-            "output": operator.output,
+            "outputs": _outputs(operator, f"{base}_result"),
             "result": f"{base}_result",
             "type": vhdl_type(operator.width),
             "has_wait": operator.has_wait,
@@ -597,6 +601,17 @@ def _commented(lines: Sequence[tuple[str, str, Node | None]]) -> list[Context]:
         found.append({"comment": comment, "target": target, "value": text})
         before = place
     return found
+
+
+def _outputs(operator: Operator, result: str) -> list[Context]:
+    """Return the ports of a result, each with its part of the signal."""
+    if len(operator.outputs) == 1:
+        return [{"port": operator.outputs[0], "signal": result}]
+    width = operator.width // len(operator.outputs)
+    return [
+        {"port": port, "signal": f"{result}({width * (place + 1) - 1} downto {width * place})"}
+        for place, port in enumerate(operator.outputs)
+    ]
 
 
 def _words(name: str) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ class RandomFunction:
     integers: list[str] = field(default_factory=lambda: ["m.i", "m.j", "self.n"])
     bools: list[str] = field(default_factory=lambda: ["m.p", "m.q"])
     divisions: int = 0
+    angles: int = 0
 
     def text(self) -> str:
         """Return the source."""
@@ -123,13 +124,16 @@ class Random:
             return self.source.choice(self.floats) if self.source.random() < 0.8 else self._constant("np.float64")
         one = self.float_(depth - 1)
         other = self.float_(depth - 1) if self.source.random() < 0.8 else self._constant("")
-        draw = self.source.randrange(12)
+        draw = self.source.randrange(13)
         if draw == 0 and self.divisions < 2:
             self.divisions += 1
             return f"({one} / {other})"
         if draw == 1 and self.divisions < 2:
             self.divisions += 1
             return f"math.sqrt(abs({one}))"
+        if draw == 12 and self.angles < 2:
+            self.angles += 1
+            return f"{self.source.choice(['math.sin', 'math.cos', 'math.tan', 'np.sin', 'np.cos'])}({one})"
         forms = {
             2: f"max({one}, {other})",
             3: f"min({one}, {other})",
@@ -155,6 +159,9 @@ class Random:
             f"np.float32({self.float_(depth - 1)})",
             f"({one} * 4.0 / 8.0)",
         ]
+        if self.angles < 2 and self.source.random() < 0.1:
+            self.angles += 1
+            return f"{self.source.choice(['np.sin', 'np.cos', 'np.tan', 'math.sin'])}({one})"
         return self.source.choice(forms)
 
     def integer(self, depth: int) -> str:

@@ -82,6 +82,20 @@ state = State()
 """,
 }
 
+_ANGLES = """
+import math
+import numpy as np
+from math import cos
+
+
+def angles(m):
+    return {
+        "a": math.sin(m.a), "b": cos(m.a) + np.exp(m.d), "c": np.sin(m.c), "d": np.tan(m.c) - np.cos(np.float32(0.5)),
+        "v": [math.tan(m.b), math.sin(m.i), -math.cos(m.b) * math.sin(2.0) + math.tan(0.3)],
+        "p": math.isnan(np.cos(m.v[0])), "q": np.sin(m.j) > np.cos(m.v[1]),
+    }
+"""
+
 
 def check(units: list[Unit], messages: int, folder: Path, seed: int) -> None:
     sent = random_messages(random.Random(seed), messages)
@@ -93,6 +107,11 @@ def check(units: list[Unit], messages: int, folder: Path, seed: int) -> None:
 @pytest.mark.check
 def test_functions_answer_as_python_does(tmp_path: Path) -> None:
     check([Unit(name, text) for name, text in _FUNCTIONS.items()], 40, tmp_path, _SEED)
+
+
+@pytest.mark.check
+def test_angles_have_the_results_of_the_models(tmp_path: Path) -> None:
+    check([Unit("angles", _ANGLES)], 10, tmp_path, _SEED)
 
 
 @pytest.mark.check
@@ -135,6 +154,15 @@ def test_an_operation_stays_as_it_is_written() -> None:
 def test_only_exact_identities_are_used(expression: str, operations: list[str]) -> None:
     nodes = Unit("f", f"def f(m):\n    return {{'a': {expression}}}\n").program().needed()
     assert [node.operation for node in nodes if node.operation not in ("constant", "input")] == operations
+
+
+@pytest.mark.parametrize(("library", "kind"), [("math", "float64"), ("np", "float32")])
+def test_one_operation_computes_sine_and_cosine_of_an_angle(library: str, kind: str) -> None:
+    angle = "m.a" if kind == "float64" else "m.c"
+    values = ", ".join(f"{library}.{name}({angle})" for name in ("sin", "cos", "tan"))
+    text = f"import math\nimport numpy as np\n\n\ndef f(m):\n    return {{'v': [{values}]}}\n"
+    nodes = [node for node in Unit("f", text).program().needed() if node.operation in ("sincos", "divide")]
+    assert [(node.operation, node.kind.name) for node in nodes] == [("sincos", f"{kind}_pair"), ("divide", kind)]
 
 
 def test_more_units_take_fewer_steps() -> None:
