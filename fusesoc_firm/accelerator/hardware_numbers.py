@@ -22,7 +22,12 @@ from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
-_OPERATORS = {ast.Pow: "_firm_power", ast.Div: "_firm_quotient"}
+_OPERATORS = {
+    ast.Pow: "_firm_power",
+    ast.Div: "_firm_quotient",
+    ast.FloorDiv: "_firm_floor_quotient",
+    ast.Mod: "_firm_remainder",
+}
 _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
 
@@ -95,7 +100,7 @@ def silent() -> Iterator[None]:
 
 
 def prepared(module: ast.Module) -> ast.Module:
-    """Return a source in which powers and quotients are calls of functions of this module."""
+    """Return a source in which powers, quotients and remainders are calls of functions of this module."""
     made: ast.Module = ast.fix_missing_locations(_Replaced().visit(module))
     return made
 
@@ -125,6 +130,20 @@ def quotient(one: Any, other: Any) -> Any:
         return one / other
     except ZeroDivisionError:
         return float(np.float64(one) / np.float64(other))
+
+
+def floor_quotient(one: Any, other: Any) -> Any:
+    """Return `one // other`; by zero, it is 0 also for integers of Python."""
+    return one * 0 if _is_python_zero(other) else one // other
+
+
+def remainder(one: Any, other: Any) -> Any:
+    """Return `one % other`; by zero, it is 0 also for integers of Python."""
+    return one * 0 if _is_python_zero(other) else one % other
+
+
+def _is_python_zero(value: Any) -> bool:
+    return type(value) is int and not value
 
 
 def power(base: Any, exponent: Any) -> Any:
@@ -253,5 +272,10 @@ def adopt(module: ModuleType) -> None:
 
 
 def begin(module: ModuleType) -> None:
-    """Give a module, before it runs, the functions that take the place of `**` and `/`."""
-    vars(module).update(_firm_power=power, _firm_quotient=quotient)
+    """Give a module, before it runs, the functions that take the place of operators."""
+    vars(module).update(
+        _firm_power=power,
+        _firm_quotient=quotient,
+        _firm_floor_quotient=floor_quotient,
+        _firm_remainder=remainder,
+    )

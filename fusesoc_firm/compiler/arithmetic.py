@@ -24,6 +24,7 @@ from fusesoc_firm.compiler.kinds import (
     INT,
     INTEGERS,
     Kind,
+    integer_pair,
     number_of,
     pair_of,
     result_kind,
@@ -69,10 +70,10 @@ class Arithmetic:
 
     def binary(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         """Return `one <operator> other`."""
-        if one.is_constant and other.is_constant:
-            return self._folded(kind, one, other)
         if kind is ast.Pow:
             return self._power(one, other)
+        if one.is_constant and other.is_constant:
+            return self._folded(kind, one, other)
         if kind in (ast.LShift, ast.RShift):
             return self._shift(kind, one, other)
         if kind not in _OPERATORS:
@@ -194,22 +195,35 @@ class Arithmetic:
         return self.graph.node("shift_right", (value,), result, count, (value.low >> count, value.high >> count))
 
     def _quotient(self, kind: type[ast.operator], one: Node, other: Node, result: Kind) -> Node:
-        """Return the quotient or the rest of a division by a constant power of two."""
+        """Return the quotient, rounded down, or the remainder of integers."""
         if result.is_float:
             form = "math.floor(a / b)" if kind is ast.FloorDiv else "a - math.floor(a / b) * b"
             raise RefusalError("'//' and '%' of floats are not hardware", f"write {form}")
+        if other.is_constant and not other.payload:
+            raise RefusalError("a division by zero", "divide by another number")
         shift = _power_of_two(int(other.payload)) if other.is_constant else None
         if shift is None:
-            raise RefusalError(
-                "integers are divided only by constants that are powers of two",
-                "write int(a / b), a division of floats",
-            )
+            return self._divided(kind, self._to(one, result), self._to(other, result), result)
         value = self._to(one, result)
         if kind is ast.FloorDiv:
             limits = value.low >> shift, value.high >> shift
             return self.graph.node("shift_right", (value,), result, shift, limits)
         mask = self._to(self.graph.constant((1 << shift) - 1), result)
         return self.graph.node("and", (value, mask), result, limits=(0, (1 << shift) - 1))
+
+    def _divided(self, kind: type[ast.operator], one: Node, other: Node, result: Kind) -> Node:
+        """Return one of the results of the operator that divides; both are 0 by zero."""
+        pair = integer_pair(max(item.bits + (not item.is_signed) for item in (one, other)))
+        both = self.graph.node("divmod", (one, other), pair)
+        most = (1 << pair.bits // 2 - 1) - 1
+        if kind is ast.FloorDiv:
+            found = self.graph.node("quotient", (both,), INT, limits=(~most, most))
+            largest = max(abs(one.low), abs(one.high))
+            limits = 0 if one.low >= 0 and other.low >= 0 else -largest, largest
+        else:
+            found = self.graph.node("remainder", (both,), INT, limits=(~most, most))
+            limits = min(other.low + 1, 0), max(other.high - 1, 0)
+        return self.graph.node("wrap", (found,), result, limits=self._limited(*limits))
 
     def _power(self, one: Node, other: Node) -> Node:
         """Return a power with a constant exponent: products from the left, a square root, a quotient."""
@@ -218,7 +232,9 @@ class Arithmetic:
         exponent = other.payload
         if exponent == 0.5:
             return self.square_root(one)
-        if exponent != int(exponent) or abs(exponent) > _MOST_POWER:
+        if one.is_constant and exponent != int(exponent):
+            return self._folded(ast.Pow, one, other)
+        if exponent != int(exponent) or abs(exponent) > (_MOST_BITS if one.is_constant else _MOST_POWER):
             raise RefusalError(
                 f"'** {exponent}' is not hardware", f"legal exponents: -{_MOST_POWER} to {_MOST_POWER}, and 0.5"
             )

@@ -8,7 +8,8 @@
 | add, subtract, multiply, divide, square_root | numbers of the result's kind | correctly rounded |
 | atan2, exp, log | floats of the result's kind | that of the operator's model |
 | sincos | a float | a pair: its sine and its cosine, those of the operator's model |
-| sine, cosine | the pair | one of its numbers |
+| divmod | two integers | a pair: the quotient, rounded down, and the remainder; both 0 by zero |
+| sine, cosine, quotient, remainder | the pair | one of its numbers |
 | to_float, to_integer, resize | a number of another kind | the nearest number; towards zero |
 | less, at_most, equal | two numbers of one kind, or integers | a truth value |
 | negate, absolute, copy_sign | floats | by bits |

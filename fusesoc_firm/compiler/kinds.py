@@ -62,8 +62,14 @@ KINDS = {kind.name: kind for kind in (BOOL, FLOAT32, FLOAT64, *INTEGERS.values()
 
 
 def pair_of(kind: Kind) -> Kind:
-    """Return the kind of two floats that one operator computes; no variable has it."""
-    return Kind(f"{kind}_pair", 2 * kind.bits, is_float=True)
+    """Return the kind of two numbers that one operator computes; no variable has it."""
+    return Kind(f"{kind}_pair", 2 * kind.bits, kind.is_float)
+
+
+def integer_pair(bits: int) -> Kind:
+    """Return the kind of two integers of at least `bits` bits: one operator computes all that are not wider."""
+    width = next(item for item in (16, 32, 64, 65) if bits <= item)
+    return pair_of(Kind(f"int{width}", width))
 
 
 def is_number(value: object) -> bool:

@@ -1,4 +1,4 @@
-"""The operators of `robot:acc:firm_float`, as the file `operators.yaml` of this core describes them."""
+"""The operators of `robot:acc:firm_float` and `robot:acc:firm_python`, as their `operators.yaml` describe them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ _NAMES = {
     "to_float": "from_fixed",
     "to_integer": "to_fixed",
     "resize": "resize",
-    **{name: name for name in ("atan2", "exp", "log", "sincos")},
+    **{name: name for name in ("atan2", "exp", "log", "sincos", "divmod")},
 }
+# Those with two results.
+_PAIRS = ("sincos", "divmod")
 # The widths of integers that are converted; one operator converts all that are not wider.
 _WIDTHS = (32, 64, 65)
 SHORT = "short"
@@ -51,14 +53,16 @@ class Operator:
     operand: int
 
 
-def table_file() -> Path:
-    """Return the path of the description of all operators."""
-    return library_root() / "cores" / "acc" / "float" / "operators.yaml"
+def table_files() -> list[Path]:
+    """Return the paths of the descriptions of all operators."""
+    return [library_root() / "cores" / "acc" / core / "operators.yaml" for core in ("float", "python")]
 
 
 @cache
 def _table() -> Mapping[str, Any]:
-    found: Mapping[str, Any] = yaml.safe_load(table_file().read_text(encoding="utf-8"))["operators"]
+    found: dict[str, Any] = {}
+    for file in table_files():
+        found |= yaml.safe_load(file.read_text(encoding="utf-8"))["operators"]
     return found
 
 
@@ -75,13 +79,13 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
     size = node.operands[0].kind if of_operand else node.kind
     description = _table()[_NAMES[node.operation]]
     forms = description["forms"]
-    facts = forms.get(form, forms["default"])[_size(size)]
-    width, generics = _conversion(node)
+    width, generics = _width(node)
+    facts = forms.get(form, forms["default"])[f"int{width}" if node.operation == "divmod" else _size(size)]
     latency = facts["latency"]
     if not isinstance(latency, int):
         latency = next(cycles for most, cycles in latency.items() if width <= most)
     ports = tuple(name for name, type_ in description["inputs"].items() if type_ != "bit")
-    results = tuple(description["outputs"]) if node.operation == "sincos" else (next(iter(description["outputs"])),)
+    results = tuple(description["outputs"]) if node.operation in _PAIRS else (next(iter(description["outputs"])),)
     return Operator(
         node.operation,
         description["entity"],
@@ -91,7 +95,7 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
         latency,
         facts["interval"] != 1,
         width if node.operation == "to_integer" else node.kind.bits,
-        width if node.operation == "to_float" else size.bits,
+        width if node.operation in ("to_float", "divmod") else size.bits,
     )
 
 
@@ -99,8 +103,10 @@ def _size(kind: Kind) -> str:
     return "float32" if kind.bits == 32 else "float64"
 
 
-def _conversion(node: Node) -> tuple[int, tuple[tuple[str, str], ...]]:
-    """Return the width of a converted integer, and the generics that set it."""
+def _width(node: Node) -> tuple[int, tuple[tuple[str, str], ...]]:
+    """Return the width of an operation's integers, and the generics that set it."""
+    if node.operation == "divmod":
+        return node.kind.bits // 2, ()
     if node.operation == "to_float":
         value = node.operands[0]
         needed = value.bits + (not value.is_signed)

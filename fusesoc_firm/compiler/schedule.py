@@ -17,7 +17,7 @@ from fusesoc_firm.compiler.program import Program
 
 # Operations that are part of the reader's expression: wires, or one inverter a bit.
 _OF_FLOATS = ("negate", "absolute", "copy_sign", "rename", "sine", "cosine")
-TRANSPARENT = (*_OF_FLOATS, "wrap", "shift_left", "shift_right", "invert")
+TRANSPARENT = (*_OF_FLOATS, "quotient", "remainder", "wrap", "shift_left", "shift_right", "invert")
 # Delays in tenths of a nanosecond in an ECP5-8, and the most that lie between two registers.
 _BUDGET = 60
 _SELECTION = 15

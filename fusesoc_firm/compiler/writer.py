@@ -129,9 +129,9 @@ class Writer:
                 return f"negated({given[0]})"
             case "absolute":
                 return f"magnitude({given[0]})"
-            case "sine" | "cosine":
-                # A pair is a signal; the sine is in its lowest bits.
-                low = node.bits if node.operation == "cosine" else 0
+            case "sine" | "cosine" | "quotient" | "remainder":
+                # A pair is a signal; its first number is in the lowest bits.
+                low = node.bits if node.operation in ("cosine", "remainder") else 0
                 return f"{given[0]}({low + node.bits - 1} downto {low})"
             case "copy_sign":
                 return f"with_sign_of({given[0]}, {given[1]}, {node.kind.exponent_bits})"

@@ -179,6 +179,8 @@ class Random:
             f"({one} << {self.source.randint(0, 9)})",
             f"({one} // 8)",
             f"({one} % 16)",
+            f"({one} // {self.source.choice((*self.integers, '10', '-7'))})",
+            f"({one} % {self.source.choice((*self.integers, '10', '-7'))})",
         ]
         forms += [
             f"max({one}, {other})",

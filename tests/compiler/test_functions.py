@@ -49,6 +49,17 @@ def control(m):
         "w": [m.w[m.k & 3], m.w[0] >> 2, m.i << 1, m.j // 4],
     }
 """,
+    "divided": """
+def divided(m):
+    return {
+        "i": m.i // m.j, "j": m.i % m.j, "k": m.k // 7 + m.k % 10, "n": m.n // m.i, "a": float(m.n % (m.k - 100)),
+        "b": divmod_(int(m.c), m.n), "w": [m.w[0] // m.w[1], m.w[0] % m.w[1], m.w[2] // -3, m.w[3] % -1],
+    }
+
+
+def divmod_(a, b):
+    return a // b * 1000.0 + a % b
+""",
     "limits": """
 def limits(m):
     return {
@@ -149,6 +160,8 @@ def test_an_operation_stays_as_it_is_written() -> None:
         ("m.a - 0.0", ["add"]),
         ("-(-m.a)", []),
         ("2.0 * 3.5", []),
+        # As the product that the model computes: Python's power raises an exception.
+        ("1e300 ** 2 + 2 ** 40 + 4 ** 0.75", []),
     ],
 )
 def test_only_exact_identities_are_used(expression: str, operations: list[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import KINDS
-from fusesoc_firm.compiler.operators import table_file
+from fusesoc_firm.compiler.operators import table_files
 from fusesoc_firm.compiler.program import Program, Task, compile_function
 from fusesoc_firm.compiler.schedule import Schedule, scheduled
 from fusesoc_firm.compiler.source import Source
@@ -28,7 +28,7 @@ def compiled(type_: AcceleratorType, folder: Path) -> Rendering:
 
 def compiler_files() -> list[Path]:
     """Return the files, beside the source, that determine the entity."""
-    return [table_file(), table_file().with_name("model.py")]
+    return [*table_files(), table_files()[0].with_name("model.py")]
 
 
 def schedule_of(type_: AcceleratorType, folder: Path) -> Schedule:
