@@ -41,7 +41,7 @@ _NOTES = {
     _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through, and
         `clock` in the specification is the bar. The others are the demo systems.""",
     _ARITHMETIC_TITLE: """The entities of [Arithmetic](../reference/arithmetic.md) for float64 and float32, with
-        fixed-point numbers of 32 bits. Multipliers (MULT18X18D) are not counted.""",
+        fixed-point numbers of 32 bits, and the division of integers. Multipliers (MULT18X18D) are not counted.""",
     _LOOP_TITLE: "The path from a grant through the Manager and back to the scheduler is included.",
 }
 
@@ -298,12 +298,14 @@ def _arithmetic() -> Iterator[Row]:
         yield Row(f"firm_float_resize to {other} bits", width, _operation("firm_float_resize", generics))
     for entity in "firm_fixed_add", "firm_fixed_multiply", "firm_fixed_divide", "firm_fixed_resize":
         yield Row(entity, 32, _operation(entity, {}))
+    for width in (16, 32, 64):
+        yield Row("firm_integer_divide", width, _operation("firm_integer_divide", {"WIDTH": width}))
 
 
 def _operation(entity: str, generics: Mapping[str, int]) -> Callable[[Path], Design]:
     def make(folder: Path) -> Design:
         library = Library("firm", folder)
-        library.analyse(core_files("acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed"))
+        library.analyse(core_files("acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed", "acc/python/python"))
         return _synthesised(Subject(library, entity, generics))
 
     return make
