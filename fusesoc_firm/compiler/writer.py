@@ -24,9 +24,10 @@ from fusesoc_firm.text.render import Context
 TEMPLATE = "vhdl/python_accelerator.vhd"
 
 # The signals of the template.
-_SIGNALS = (
-    "step_r advance holds is_open is_checked accepted done sent_r firm rtl work ieee operations control clk rst_n"
-).split()
+_SIGNALS = """
+    step_r at_step_r advance holds is_open is_checked accepted done sent_r
+    firm rtl work ieee operations control clk rst_n
+""".split()
 _INTEGER_OPERATORS = {"add": "+", "subtract": "-"}
 _LONGEST_COMMENT = 90
 
