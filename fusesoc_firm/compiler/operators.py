@@ -34,6 +34,17 @@ SHORT = "short"
 
 
 @dataclass(frozen=True)
+class Cost:
+    """The cells of an operator in an ECP5-8 and its clock in MHz; `longest` is the latency with the worst operands."""
+
+    lut: int
+    ff: int
+    dsp: int
+    megahertz: float
+    longest: int
+
+
+@dataclass(frozen=True)
 class Operator:
     """An entity that computes one operation: the generics, and the ports of the operands and of the result.
 
@@ -51,6 +62,7 @@ class Operator:
     has_wait: bool
     width: int
     operand: int
+    cost: Cost
 
 
 def table_files() -> list[Path]:
@@ -96,6 +108,7 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
         facts["interval"] != 1,
         width if node.operation == "to_integer" else node.kind.bits,
         width if node.operation in ("to_float", "divmod") else size.bits,
+        Cost(facts["lut"], facts["ff"], facts["dsp"], facts["megahertz"], facts.get("longest", latency)),
     )
 
 

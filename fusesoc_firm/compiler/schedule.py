@@ -63,8 +63,13 @@ class Schedule:
 
     @property
     def latency(self) -> int:
-        """The cycles from a message to its answer, without the elements of streams."""
-        return sum(self.steps[::2]) + 1
+        """The cycles from a complete message to its answer, without those of elements of streams."""
+        return sum(self.steps[::2])
+
+    @property
+    def interval(self) -> int:
+        """The cycles between two messages: the answer is taken, and the message released, in two more cycles."""
+        return self.latency + 2
 
     @property
     def bases(self) -> list[int]:

@@ -110,7 +110,7 @@ def _ports(frame: Frame) -> list[tuple[str, SidePort]]:
     return taken + [("out_", port) for port in side_ports(frame, 8, gives=True, has_valid=False)]
 
 
-def _placed(prefix: str) -> tuple[list[dict[str, str]], int]:
+def placed_bits(prefix: str) -> tuple[list[dict[str, str]], int]:
     """The bits of each field in a vector, and their number."""
     found, low = [], 0
     for side, port in _ports(FRAME):
@@ -122,7 +122,7 @@ def _placed(prefix: str) -> tuple[list[dict[str, str]], int]:
     return found, low
 
 
-def _bits(message: Mapping[str, Any]) -> str:
+def bits_of_message(message: Mapping[str, Any]) -> str:
     """The fields of a message as bits, the first one in the lowest."""
     text = ""
     for leaf in side_of("in_", FRAME).leaves:
@@ -168,7 +168,7 @@ def simulated(
     firm.analyse(core_files("axis/package", "acc/cordic/cordic", "acc/float/float", "acc/python/python"))
     for unit in units:
         (folder / f"{unit.name}.vhd").write_text(unit.vhdl(), encoding="utf-8")
-    (inputs, in_bits), (outputs, out_bits) = _placed("in_"), _placed("out_")
+    (inputs, in_bits), (outputs, out_bits) = placed_bits("in_"), placed_bits("out_")
     bench = chevron.render(
         _TEMPLATE.read_text(encoding="utf-8"),
         {
@@ -182,7 +182,7 @@ def simulated(
     )
     (folder / "compiled_bench.vhd").write_text(bench, encoding="utf-8")
     work.analyse([*(folder / f"{unit.name}.vhd" for unit in units), folder / "compiled_bench.vhd"])
-    (folder / "vectors.txt").write_text("".join(f"{_bits(message)}\n" for message in messages))
+    (folder / "vectors.txt").write_text("".join(f"{bits_of_message(message)}\n" for message in messages))
     print(f"seed {seed}")
     generics: dict[str, Generic] = {"VECTORS": str(folder / "vectors.txt"), "RESULTS": f"{folder}/", "SEED": seed}
     found = work.run("compiled_bench", generics, seconds=600)

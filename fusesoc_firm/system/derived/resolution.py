@@ -6,6 +6,7 @@ block has no message sides, and later checks ignore it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -28,6 +29,7 @@ from fusesoc_firm.system.derived.quality import check_quality
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name
 from fusesoc_firm.system.written.sources import declares_width
 from fusesoc_firm.system.written.specification import (
+    BUDGETS,
     CONVERTER,
     CONVERTER_KEYS,
     PUBLISHER,
@@ -49,7 +51,7 @@ from fusesoc_firm.text.yaml_text import Text
 
 Libraries = Mapping[Middleware, MessageLibrary]
 # The most operators of a kind in an accelerator.
-_MOST_OPERATORS = 16
+MOST_OPERATORS = 16
 _KINDS_OF_BLOCKS = "a block is either an accelerator with 'type' or a converter with 'middleware', 'mode' and 'message'"
 
 
@@ -200,16 +202,18 @@ class _Resolver:
 
     def _check_compiled(self, accelerator: Accelerator) -> None:
         """Note keys of compiled functions at an accelerator in another language, and illegal numbers of operators."""
-        for key in ("numbers", "resources"):
+        for key in ("numbers", "resources", "latency", "interval"):
             if key in accelerator.places and accelerator.type and not accelerator.is_compiled:
                 message = f"'{key}' is legal only for Python, but '{accelerator.name}' has the type {accelerator.type}"
                 self.faults.error(message, accelerator.place(key), "remove the key")
         if resources := accelerator.resources:
             for name, (key, _) in keys_of(Resources).items():
                 count = getattr(resources, key)
-                if count is not None and not 1 <= count <= _MOST_OPERATORS:
+                least, most = (0, math.inf) if key in BUDGETS else (1, MOST_OPERATORS)
+                if count is not None and not least <= count <= most:
                     message = f"'{name}' of '{accelerator.name}' cannot be {count}"
-                    self.faults.error(message, resources.place(key), f"legal here: 1 to {_MOST_OPERATORS}")
+                    legal = "0 or more" if key in BUDGETS else f"1 to {MOST_OPERATORS}"
+                    self.faults.error(message, resources.place(key), f"legal here: {legal}")
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NoReturn
 
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import KINDS
 from fusesoc_firm.compiler.operators import table_files
 from fusesoc_firm.compiler.program import Program, Task, compile_function
-from fusesoc_firm.compiler.schedule import Schedule, scheduled
+from fusesoc_firm.compiler.schedule import Schedule
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.writer import TEMPLATE, Writer
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, shown_path
 from fusesoc_firm.system.hardware.instances import declarations
-from fusesoc_firm.system.written.specification import Resources
+from fusesoc_firm.system.hardware.limits import BudgetError, LimitError, fastest_of_budget, fastest_within
+from fusesoc_firm.system.written.specification import BUDGETS, Resources
+from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Rendering
 from fusesoc_firm.text.yaml_sections import keys_of
 
 
 def compiled(type_: AcceleratorType, folder: Path) -> Rendering:
     """Return the template and configuration of the entity. Raise `InputError` for a function that is not hardware."""
-    writer = Writer(bound(schedule_of(type_, folder)))
+    return entity_of(type_, schedule_of(type_, folder))
+
+
+def entity_of(type_: AcceleratorType, schedule: Schedule) -> Rendering:
+    """Return the template and configuration of an accelerator's entity with a schedule of its function."""
+    writer = Writer(bound(schedule))
     return Rendering(TEMPLATE, writer.configuration(type_.entity, declarations(type_), type_.width))
 
 
@@ -32,20 +40,66 @@ def compiler_files() -> list[Path]:
 
 
 def schedule_of(type_: AcceleratorType, folder: Path) -> Schedule:
-    """Return the scheduled function of an accelerator. May raise `InputError`."""
+    """Return the scheduled function of an accelerator. Raise `InputError` for a limit that it cannot meet, too."""
+    program, fixed, budget = program_of(type_, folder), resources_of(type_), budget_of(type_)
+    found = _of_budget(type_, program) if budget else fastest_within(program, fixed, None)
+    for key, extra in (("latency", 0), ("interval", found.interval - found.latency)):
+        limit = getattr(type_.accelerator, key)
+        if limit is not None and found.latency + extra > limit:
+            if budget:
+                _refuse_limit(type_, key, found.latency + extra)
+            try:
+                found = fastest_within(program, fixed, limit - extra)
+            except LimitError as error:
+                _refuse_limit(type_, key, error.shortest + extra)
+    return found
+
+
+def resources_of(type_: AcceleratorType) -> dict[str, int]:
+    """Return the numbers of operators that the specification gives."""
+    return {name: count for name, count in _given(type_).items() if name not in BUDGETS}
+
+
+def budget_of(type_: AcceleratorType) -> dict[str, int]:
+    """Return the cells to which the specification limits an accelerator."""
+    return {name: count for name, count in _given(type_).items() if name in BUDGETS}
+
+
+def _given(type_: AcceleratorType) -> dict[str, int]:
     resources = type_.accelerator.resources
     names = [field for field, _ in keys_of(Resources).values()]
-    limits = {name: count for name in names if resources and (count := getattr(resources, name))}
-    return scheduled(program_of(type_, folder), limits)
+    return {name: count for name in names if resources and (count := getattr(resources, name)) is not None}
 
 
-def program_of(type_: AcceleratorType, folder: Path) -> Program:
-    """Return the compiled function of an accelerator. May raise `InputError`."""
+def _of_budget(type_: AcceleratorType, program: Program) -> Schedule:
+    budget, resources = budget_of(type_), type_.accelerator.resources
+    try:
+        return fastest_of_budget(program, resources_of(type_), budget)
+    except BudgetError as error:
+        name = next(name for name, most in budget.items() if error.least[name] > most)
+        message = f"'{type_.accelerator.name}' is larger than the {budget[name]} of '{name}'"
+        assert resources
+        fail(message, resources.place(name), f"legal here: at least {error.least[name]}, as estimated")
+
+
+def _refuse_limit(type_: AcceleratorType, key: str, shortest: int) -> NoReturn:
+    accelerator = type_.accelerator
+    given = ", ".join(f"{name}: {count}" for name, count in _given(type_).items())
+    within = f" with 'resources: {{{given}}}'" if given else ""
+    message = f"'{key}' of '{accelerator.name}' cannot be {getattr(accelerator, key)}{within}"
+    fail(message, accelerator.place(key), f"legal here: {shortest} cycles or more")
+
+
+def program_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Program:
+    """Return the compiled function of an accelerator, whose floats have the type `numbers`, if it is given.
+
+    May raise `InputError`.
+    """
     path = type_.accelerator.sources[0]
     text = (folder / path).read_text(encoding="utf-8", errors="replace")
-    numbers = KINDS[str(type_.accelerator.numbers)] if type_.accelerator.numbers else None
+    floats = KINDS.get(numbers or str(type_.accelerator.numbers))
     inputs = [side_of(side.prefix, side.frame) for side in type_.inputs]
     outputs = [
         side_of(side.prefix, side.frame, *([side.length.source.value] if side.length else [])) for side in type_.outputs
     ]
-    return compile_function(Task(Source(shown_path(path), text), function_name(type_), inputs, outputs, numbers))
+    return compile_function(Task(Source(shown_path(path), text), function_name(type_), inputs, outputs, floats))

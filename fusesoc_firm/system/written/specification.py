@@ -36,6 +36,8 @@ ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = TOPIC_MODES = ("subscriber", "publisher")
 SERVER, CLIENT = SERVICE_MODES = ("server", "client")
 MODES = (*TOPIC_MODES, *SERVICE_MODES)
+# The keys of an accelerator's resources that limit its cells.
+BUDGETS = ("lut", "dsp")
 # The two kinds of blocks.
 CONVERTER, ACCELERATOR = "converter", "accelerator"
 # The keys that make a block a converter.
@@ -298,12 +300,17 @@ class Pin(Section):
 
 @dataclass(frozen=True)
 class Resources(Section):
-    """The operators of an accelerator in Python: how many operations of a kind may run at the same time."""
+    """The operators of an accelerator in Python: how many operations of a kind may run at the same time.
+
+    With a key of `BUDGETS`, the accelerator has the fastest operators whose estimated cells are not more.
+    """
 
     add: int | None = key("adders, 1 to 16 (default: 1)", form="integer")
     multiply: int | None = key("multipliers, 1 to 16 (default: 1)", form="integer")
     divide: int | None = key("dividers, 1 to 16 (default: 1)", form="integer")
     square_root: int | None = key("square roots, 1 to 16 (default: 1)", form="integer")
+    lut: int | None = key("the most LUT4, as estimated: the accelerator is as fast as they allow", form="integer")
+    dsp: int | None = key("the most multipliers of 18 bits, in the same way", form="integer")
 
 
 @dataclass(frozen=True)
@@ -334,6 +341,12 @@ class Accelerator(Section):
     )
     resources: Resources | None = key(
         "the operators of an accelerator in Python", form="section", section=Resources, is_asked=False
+    )
+    latency: int | None = key(
+        "the most cycles from a message to the answer of an accelerator in Python", form="integer", is_asked=False
+    )
+    interval: int | None = key(
+        "the most cycles between two messages of an accelerator in Python", form="integer", is_asked=False
     )
 
     @property
