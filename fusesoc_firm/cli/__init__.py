@@ -36,6 +36,7 @@ _MODULES = {
     "doctor": "doctor",
     "system": "system",
     "scheduler": "scheduler",
+    "accelerator": "accelerator",
     "test": "test",
     "build": "build",
     "emulate": "emulate",

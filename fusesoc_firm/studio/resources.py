@@ -81,22 +81,30 @@ async def resources_of(spec: Path, tell: Tell) -> dict[str, Any]:
     The keys are `device`, `blocks`, `clocks` (MHz by name, empty without nextpnr) and `missing` (how to install
     nextpnr). A cancelled call ends the programs that it started. May raise `InputError`.
     """
-    core, yosys, nextpnr = _core(spec), _yosys(), find("nextpnr-ecp5")
+    core, yosys = _core(spec), yosys_program()
     with tempfile.TemporaryDirectory(prefix="firm-resources-") as place:
-        folder = Path(place)
         await tell({"step": STEPS[0]})
-        netlist, top = await _netlist(spec, core, folder)
-        key = await asyncio.to_thread(_key, netlist, yosys, nextpnr)
-        file = Path(default_root()) / "resources" / f"{key}.json"
-        if known := _read(file):
-            return known
-        await tell({"step": STEPS[1]})
-        found = await _mapped(netlist, top, yosys)
-        if nextpnr:
-            await tell({"step": STEPS[2]} | found)
-            found |= await _placed(folder, nextpnr, found["blocks"])
-        else:
-            found["missing"] = f"for the clocks, nextpnr is missing: {ways('nextpnr-ecp5')}"
+        netlist, top = await _netlist(spec, core, Path(place))
+        return await resources_of_netlist(netlist, top, yosys, tell)
+
+
+async def resources_of_netlist(netlist: Path, top: str, yosys: Path, tell: Tell) -> dict[str, Any]:
+    """Return the resources of each instance in a netlist in Verilog, with the keys of `resources_of`.
+
+    Files are written beside the netlist.
+    """
+    nextpnr = find("nextpnr-ecp5")
+    key = await asyncio.to_thread(_key, netlist, yosys, nextpnr)
+    file = Path(default_root()) / "resources" / f"{key}.json"
+    if known := _read(file):
+        return known
+    await tell({"step": STEPS[1]})
+    found = await _mapped(netlist, top, yosys)
+    if nextpnr:
+        await tell({"step": STEPS[2]} | found)
+        found |= await _placed(netlist.parent, nextpnr, found["blocks"])
+    else:
+        found["missing"] = f"for the clocks, nextpnr is missing: {ways('nextpnr-ecp5')}"
     await asyncio.to_thread(_keep, file, found)
     return found
 
@@ -105,10 +113,15 @@ async def _netlist(spec: Path, core: CoreFile, folder: Path) -> tuple[Path, str]
     """Create the netlist of a core in a folder, and return it and the name of its top level."""
     await _run(fusesoc_run(core, _TARGET, folder, "--setup"), project_folder(spec))
     (request,) = folder.glob("*.ghdlsynth")
-    await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], folder)
+    await translated(request)
     (description,) = folder.glob("*.eda.yml")
     top = data_in(description)["toplevel"]
     return folder / f"{request.stem}_netlist.v", str(top)
+
+
+async def translated(request: Path) -> None:
+    """Run the translation to Verilog in a file of `Translation.to_json`, in its folder. May raise `InputError`."""
+    await _run([sys.executable, "-m", "fusesoc_firm.netlist", request.name], request.parent)
 
 
 async def _mapped(netlist: Path, top: str, yosys: Path) -> dict[str, Any]:
@@ -187,8 +200,8 @@ def _core(spec: Path) -> CoreFile:
     return core
 
 
-def _yosys() -> Path:
-    """Return Debian's Yosys or YoWASP's."""
+def yosys_program() -> Path:
+    """Return Debian's Yosys or YoWASP's. Raise `InputError` if it or GHDL is missing."""
     if absent := missing(["ghdl"]):
         fail(f"missing program: {absent[0]}", hint=ways(absent[0]))
     beside = os.pathsep.join([os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)])
