@@ -43,9 +43,9 @@ class Views:
         return in_json(await self._workspace.in_turn(generated, loaded, request.query.get("name", "")))
 
     async def _schedulers(self, request: web.Request) -> web.Response:
-        """Return the analysis of all schedulers for the system, or the missing times."""
-        loaded = await self._loaded(request)
+        """Return the analysis of all schedulers for the system, or what it lacks: times, or a change of this moment."""
         try:
+            loaded = await self._loaded(request)
             return in_json(await self._workspace.in_turn(schedulers, loaded))
         except InputError as error:
             return in_json({"missing": str(error)})
