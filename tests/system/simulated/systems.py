@@ -80,7 +80,8 @@ def call(spec: Path, stimuli: Path, model: Path | None, **parameters: Plain) -> 
         "distro": None,
         **parameters,
     }
-    known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model) if model else None, "product": "simulation"}
+    known |= {"spec": spec.name, "stimuli": str(stimuli), "model": None, "product": "simulation"}
+    known |= {"model": str(model)} if model else {}
     return Request("far", "test:sys:system-simulation:0", spec.parent, known)
 
 
