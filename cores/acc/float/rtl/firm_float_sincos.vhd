@@ -52,6 +52,11 @@ architecture rtl of firm_float_sincos is
   constant LOW           : positive := MANTISSA_BITS + 3;
   -- The digits of 2/pi begin with this one before the exponent, counted in digits: those before are whole turns.
   constant WHOLE         : positive := (MANTISSA_BITS + 1) / 2;
+  -- Fraction bits of z when the quadrant is taken. Further digits move z by less than a unit of them, so that the first
+  -- angle still reaches it.
+  constant SPLIT         : positive := 5;
+  -- z has enough bits if its magnitude is at least 1/4, so 2**-MARGIN before its last digit.
+  constant MARGIN        : positive := 4;
   -- Cycles that bring the mantissa of a small angle to the place of z.
   constant MOVES         : positive := FRACTION / 2 + 1;
   constant BIAS          : natural  := bias_of(EXPONENT_BITS);
@@ -228,7 +233,7 @@ architecture rtl of firm_float_sincos is
   signal rounded        : number_t;
 
   signal state_r        : state_t;
-  -- How the sum of sine_r is computed; these depend on the state.
+  -- How the next sine_r is computed. They repeat the state, so that no logic precedes the sum.
   signal is_reducing_r  : std_logic;
   signal is_measuring_r : std_logic;
   signal is_turning_r   : std_logic;
@@ -257,17 +262,19 @@ architecture rtl of firm_float_sincos is
   -- The angle z that is still to be subtracted, then the sine of the angle so far times a power of two.
   signal sine_r         : inner_t;
   signal cosine_r       : inner_t;
-  -- Of the next angle.
+  -- That of this cycle, and what the next one is: an angle, or the first cosine.
   signal constant_r     : inner_t;
   signal is_scaling_r   : std_logic;
-  signal first_r        : unsigned(TURN_BITS-1 downto 0);
   signal turn_r         : unsigned(TURN_BITS-1 downto 0);
+  -- The first angle, s.
+  signal first_r        : unsigned(TURN_BITS-1 downto 0);
   -- Whether each angle was added to z; that of the last one is the lowest.
   signal signs_r        : std_logic_vector(LAST-1 downto 0);
   -- sine_r, moved for the upper bits of the distance.
   signal coarse_r       : inner_t;
   signal distance_r     : distance_t;
   signal pointer_r      : pointer_t;
+  -- The next term; then the sign of this one, and whether it is the last one.
   signal term_r         : term_t;
   signal is_minus_r     : std_logic;
   signal is_last_r      : std_logic;
@@ -337,7 +344,6 @@ begin
       product       := summed(signed(shift_left(resize(low_r(LOW-3 downto 0), LOW+2), 2)), multiple,
                               digit_r(1) and digit_r(0));
       next_exponent := exponent_r - 2;
-
       next_index    := index_r;
 
       -- z and the sine.
@@ -354,7 +360,7 @@ begin
       if is_reducing_r = '1' then
         base := sine_r(WIDTH-3 downto 0) & signed(low_r(LOW-1 downto LOW-2));
         if is_split_r = '1' then
-          base(WIDTH-1 downto 6) := (others => sine_r(4));
+          base(WIDTH-1 downto SPLIT+1) := (others => sine_r(SPLIT-1));
         end if;
       elsif is_measuring_r = '1' then
         base := sine_r(WIDTH-2 downto 0) & '0';
@@ -388,7 +394,7 @@ begin
         end if;
 
       elsif state_r = PREPARE then
-        -- If the exponent is odd, the mantissa has one bit more.
+        -- If the exponent without its bias is odd, the mantissa has one bit more.
         if exponent_r(0) = '0' then
           mantissa_r <= shift_left(mantissa_r, 1);
         end if;
@@ -410,7 +416,7 @@ begin
         quadrant_r <= "00";
         is_split_r <= '0';
         is_late_r  <= '0';
-        next_state    := FETCH;
+        next_state := FETCH;
 
       elsif state_r = FETCH and is_far_r = '1' then
         is_far_r <= '0';
@@ -424,7 +430,7 @@ begin
           digit_r <= "00";
         end if;
         if state_r = FETCH then
-          sine_r <= (others => '0');
+          sine_r     <= (others => '0');
           exponent_r <= next_exponent;
           if is_small_r = '1' then
             exponent_r <= exponent_r;
@@ -436,11 +442,11 @@ begin
           carry_r    <= product(LOW+1 downto LOW);
           exponent_r <= next_exponent;
           is_split_r <= '0';
-          if next_exponent = BIAS + FRACTION - 5 then
+          if next_exponent = BIAS + FRACTION - SPLIT then
             is_split_r <= '1';
           end if;
           if is_split_r = '1' then
-            quadrant_r <= unsigned(sine_r(6 downto 5)) + unsigned(sine_r(4 downto 4));
+            quadrant_r <= unsigned(sine_r(SPLIT+1 downto SPLIT)) + unsigned(sine_r(SPLIT-1 downto SPLIT-1));
           end if;
           is_late_r <= '0';
           if next_exponent <= BIAS + 1 then
@@ -450,13 +456,13 @@ begin
           pointer_r    <= POINTERS(to_integer(turn_r(TURN_BITS-1 downto 1)));
           is_scaling_r <= '0';
           turn_r       <= candidate;
-          is_known  := '0';
+          is_known     := '0';
           if is_small_r = '1' then
             if index_r = MOVES + 2 then
               is_known := '1';
             end if;
-          elsif is_late_r = '1' and sine_r(WIDTH-1 downto FRACTION-4) /= 0 and
-                (not sine_r(WIDTH-1 downto FRACTION-4)) /= 0 then
+          elsif is_late_r = '1' and sine_r(WIDTH-1 downto FRACTION-MARGIN) /= 0 and
+                (not sine_r(WIDTH-1 downto FRACTION-MARGIN)) /= 0 then
             is_known := '1';
           end if;
           is_minus_r <= '0';
@@ -465,9 +471,9 @@ begin
             carry_r <= "00";
             if is_small_r = '1' then
               cosine_r(FRACTION) <= '1';
-              next_state            := ROUND;
+              next_state         := ROUND;
             elsif turn_r <= LAST then
-              turn_r  <= turn_r + 1;
+              turn_r     <= turn_r + 1;
               next_state := MEASURE;
             else
               next_state := LOOK_UP;
@@ -482,14 +488,14 @@ begin
           pointer_r    <= pointer_r + 1;
           turn_r       <= first_r;
           is_scaling_r <= '1';
-          next_state      := SCALE;
+          next_state   := SCALE;
         end if;
 
       elsif state_r = LOOK_UP then
         pointer_r    <= pointer_r + 1;
         turn_r       <= first_r;
         is_scaling_r <= '1';
-        next_state      := SCALE;
+        next_state   := SCALE;
 
       elsif state_r = SCALE then
         cosine_r      <= summed(cosine_r, fine_of(coarse_r, distance_r), is_minus_r);
@@ -506,7 +512,7 @@ begin
         cosine_r      <= constant_r;
         turn_r        <= to_unsigned(LAST, TURN_BITS);
         next_distance := to_unsigned(2*LAST+1, DISTANCE_BITS);
-        next_state       := TURN;
+        next_state    := TURN;
         if first_r > LAST then
           next_state := ROUND;
         end if;
