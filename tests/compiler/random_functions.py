@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 _COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+# None of them is known to be zero, which is refused.
+_DIVISORS = ("m.i", "m.j", "(self.n + m.j)", "10", "-7")
 
 
 @dataclass
@@ -179,8 +181,8 @@ class Random:
             f"({one} << {self.source.randint(0, 9)})",
             f"({one} // 8)",
             f"({one} % 16)",
-            f"({one} // {self.source.choice((*self.integers, '10', '-7'))})",
-            f"({one} % {self.source.choice((*self.integers, '10', '-7'))})",
+            f"({one} // {self.source.choice(_DIVISORS)})",
+            f"({one} % {self.source.choice(_DIVISORS)})",
         ]
         forms += [
             f"max({one}, {other})",
