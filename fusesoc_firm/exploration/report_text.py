@@ -21,13 +21,17 @@ def _head(report: Report) -> Iterator[str]:
     schedule, size = report.schedule, estimate(report.schedule)
     longest = f", at most {report.longest} with the slowest operands" if report.longest > schedule.latency else ""
     yield cut(f"{schedule.program.name}: {schedule.program.source.name}", WIDTH)
-    yield f"latency {schedule.latency} cycles{longest}; interval {schedule.interval} cycles"
+    yield f"latency {_cycles(schedule.latency)}{longest}; interval {_cycles(schedule.interval)}"
     for name, cycles in report.elements.items():
-        yield cut(f"{cycles} cycles more for each element of '{name}'", WIDTH)
+        yield cut(f"{_cycles(cycles)} more for each element of '{name}'", WIDTH)
     time = 1000 * schedule.latency / size.megahertz
     yield (
         f"estimate: {size.lut} LUT4, {size.ff} FF, {size.dsp} DSP, {size.megahertz:.0f} MHz in an ECP5-8: {time:.0f} ns"
     )
+
+
+def _cycles(number: int) -> str:
+    return f"{number} cycle{'' if number == 1 else 's'}"
 
 
 def _operators(report: Report) -> Iterator[str]:

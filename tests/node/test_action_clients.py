@@ -587,9 +587,10 @@ def test_a_result_after_the_time_limit_does_not_change_the_state(peer: Make, mon
 def test_too_many_goals_are_lost(peer: Make) -> None:
     """Their results come in their turn."""
     server = peer()
-    for number in range(MOST_WAITING + 2):
-        server.order(number)
+    server.order(0)
     identity = server.accept()
+    for number in range(1, MOST_WAITING + 2):
+        server.order(number)
     until(lambda: server.run.node.statistics.actions["count"].goals == MOST_WAITING + 2)
     assert server.results() == []
     server.order_cancel()
