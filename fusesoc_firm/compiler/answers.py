@@ -155,7 +155,7 @@ class AnswerMaker:
             self._refuse(f"'{name}' is only in some answers", "send it always, or return None")
         is_fixed = _count(part) is not None
         match given:
-            case Stream() if not isinstance(part, Elements) or _shape(given.part) == part.shape:
+            case Stream() if given.part is not None and given.part.shape == part.shape:
                 return Sent(part, given)
             case Produced(loop=number, element=element):
                 loop = next(item for item in self.interpreter.loops if item.number == number)
@@ -202,10 +202,6 @@ def _leaves(side: Side) -> Iterator[Any]:
     for node in all_nodes(side.frame.nodes):
         if isinstance(node, Fixed):
             yield from node.fields
-
-
-def _shape(part: Part | Elements | None) -> object:
-    return part.shape if isinstance(part, Elements) else None
 
 
 def _count(part: Part | Elements) -> int | None:

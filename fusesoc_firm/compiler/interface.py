@@ -83,6 +83,11 @@ class Part:
         """
         return f"element_{self.stream.removesuffix('_axis')}"
 
+    @property
+    def shape(self) -> tuple[object, ...]:
+        """What two strings or arrays have in common if one can be passed on as the other."""
+        return (self.kind, self.bits)
+
 
 @dataclass(frozen=True)
 class Elements:
@@ -202,7 +207,7 @@ def message_value(side: Side, graph: Graph, memory: Memory, numbers: Kind | None
             length = graph.leaf("input", INT, Bits(str(part.length), limits[1].bit_length() - 1), limits, phase)
         name = dotted(names_of(part.path))
         _set(tree, names_of(part.path), Stream(part, name, part.number, length, _maker(graph, part, numbers)))
-    message: Record = objects(tree, memory)
+    message: Record = _objects(tree, memory)
     return message
 
 
@@ -238,7 +243,7 @@ def _message(graph: Graph, part: Elements, numbers: Kind | None, phase: int, mem
         _set(tree, names, Stream(None, dotted(names), part.number, graph.constant(0), None))
     for step in names_of(part.path):
         tree = tree[step]
-    return objects(tree, memory)
+    return _objects(tree, memory)
 
 
 def places(path: Path) -> list[tuple[str | int, ...]]:
@@ -258,10 +263,10 @@ def _set(tree: dict[Any, Any], steps: Sequence[str | int], value: Value) -> None
     tree[last] = value
 
 
-def objects(tree: Any, memory: Memory) -> Any:
+def _objects(tree: Any, memory: Memory) -> Any:
     """Return messages and lists for the levels of a tree, or a number as it is."""
     if not isinstance(tree, dict):
         return tree
-    content = {key: objects(value, memory) for key, value in tree.items()}
+    content = {key: _objects(value, memory) for key, value in tree.items()}
     # The elements of a list are numbered from 0.
     return memory.new(Array() if 0 in content else Record(), content)

@@ -81,6 +81,7 @@ RETURNS = [
     ("return {'i': m.low}", "'i' is an integer \\(int32\\), and the answer is a float32", "round\\(\\)"),
     ("return {'ranges': [m.low]}", "'ranges' is a list", "append"),
     ("return {'name': 'a'}", "'name' is a text", "pass one"),
+    ("return {'ranges': m.name}", "'ranges' is an array of variable size", "append"),
     ("return {'ranges': m.ranges, 'more': m.ranges}", "'ranges' is sent twice", "one place"),
     ("return {'ranges': m.heights, 'more': m.ranges}", "'ranges' precedes 'more' in the answer", "one of both"),
     (_LOOP + "return {'more': m.ranges}", "'ranges' is read by a loop and passed on", "append"),
