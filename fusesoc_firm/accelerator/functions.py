@@ -196,8 +196,9 @@ def _load(block: AcceleratorBlock, folder: Path) -> UserFunction:
     path = folder / block.type.accelerator.sources[0]
     parameters = ", ".join(parameter_names(block.type))
     hint = f"expected: {prototype(block.type)}"
-    load = load_compiled if block.type.accelerator.is_compiled else load_function
-    return load(path, name, f"'{name}'", parameters, hint)
+    if block.type.accelerator.is_compiled:
+        return load_compiled(path, name, f"'{name}'", (parameters, hint), str(block.type.accelerator.numbers or ""))
+    return load_function(path, name, f"'{name}'", parameters, hint)
 
 
 def _answer(function: UserFunction, when: str, side: MessageSide, value: object) -> Message | None:

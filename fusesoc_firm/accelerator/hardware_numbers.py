@@ -12,13 +12,17 @@ import copy
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from fusesoc_firm.accelerator.message import Message
-from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64
+from fusesoc_firm.compiler.fixed import FixedNumber, Format, format_of
+from fusesoc_firm.compiler.functions import CALLS, CONSTANTS
+from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64, INTEGERS, number_of
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
@@ -28,6 +32,7 @@ _OPERATORS = {
     ast.FloorDiv: "_firm_floor_quotient",
     ast.Mod: "_firm_remainder",
 }
+_IMPORTS = (ast.Import, ast.ImportFrom)
 _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
 
@@ -56,7 +61,10 @@ def _type(part: FrameField | Data, numbers: str) -> Callable[[Any], Any]:
     if wire.name == "bool":
         # An array of variable size has bytes.
         return np.uint8 if isinstance(part, Data) else bool
-    name = numbers if numbers and wire.name.startswith("float") else wire.name
+    is_float = wire.name.startswith("float")
+    if is_float and (format_ := format_of(numbers)):
+        return format_.number
+    name = numbers if numbers and is_float else wire.name
     made: Callable[[Any], Any] = getattr(np, name)
     return made
 
@@ -81,7 +89,7 @@ def _plain(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], An
     if isinstance(value, list | tuple):
         return [_plain(item, path, types) for item in value]
     wire = types.get(path)
-    if isinstance(value, float | np.floating):
+    if isinstance(value, float | np.floating | FixedNumber):
         number = float(value)
         return math.nan if math.isnan(number) else number
     if isinstance(value, bool | np.bool_):
@@ -99,13 +107,27 @@ def silent() -> Iterator[None]:
         yield
 
 
-def prepared(module: ast.Module) -> ast.Module:
-    """Return a source in which powers, quotients and remainders are calls of functions of this module."""
-    made: ast.Module = ast.fix_missing_locations(_Replaced().visit(module))
-    return made
+def prepared(module: ast.Module, numbers: str = "") -> ast.Module:
+    """Return a source in which powers, quotients and remainders are calls of functions of this module.
+
+    After each import, the module gets the functions of hardware. Fixed-point numbers take the place of floats.
+    """
+    made: ast.Module = _Replaced(format_of(numbers) is not None).visit(module)
+    adopting = ast.Expr(ast.Call(ast.Name("_firm_adopt", ast.Load()), [], []))
+    for place in reversed([place for place, item in enumerate(made.body) if isinstance(item, _IMPORTS)]):
+        made.body.insert(place + 1, ast.copy_location(copy.deepcopy(adopting), made.body[place]))
+    return ast.fix_missing_locations(made)
 
 
+@dataclass
 class _Replaced(ast.NodeTransformer):
+    is_fixed: bool
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        if not self.is_fixed or not isinstance(node.value, float):
+            return node
+        return ast.copy_location(ast.Call(ast.Name("_firm_number", ast.Load()), [node], []), node)
+
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         return _called(node, node.op, node.left, node.right) or node
@@ -148,8 +170,11 @@ def _is_python_zero(value: Any) -> bool:
 
 def power(base: Any, exponent: Any) -> Any:
     """Return a power as hardware computes it: products from the left, the square root, or the inverse of a power."""
+    if isinstance(exponent, FixedNumber):
+        # As for the product with such a number.
+        base, exponent = exponent.format.number(base), float(exponent)
     if exponent == 0.5:
-        return square_root(base)
+        return _through(square_root, base.format, base) if isinstance(base, FixedNumber) else square_root(base)
     if exponent != int(exponent):
         return base**exponent
     if exponent < 0:
@@ -249,33 +274,78 @@ _MATH: Mapping[str, Callable[..., Any]] = {
     "exp": _modelled("exp"),
     "log": _modelled("log"),
 }
+# Functions that fixed-point numbers have themselves.
+_EXACT = ("floor", "ceil", "trunc")
 _NUMPY: Mapping[str, Callable[..., Any]] = {
     name: _of_numpy(_MATH[name]) for name in ("sin", "cos", "tan", "exp", "log")
 }
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
     "int": lambda value=0: _whole(value, int) if isinstance(value, float | np.floating) else int(value),
-    "round": lambda value: _whole(value, round) if isinstance(value, float | np.floating) else value,
+    "round": lambda value: _whole(value, round) if isinstance(value, float | np.floating | FixedNumber) else value,
 }
 
 
-def adopt(module: ModuleType) -> None:
-    """Give a module the functions of hardware in place of those of Python, `math` and NumPy."""
+def _through(function: Callable[..., Any], format_: Format, *values: Any) -> Any:
+    """Return the result of a function of floats for fixed-point numbers, a float as a fixed-point number."""
+    return _owned(function, format_)(*(item.real() if isinstance(item, FixedNumber) else item for item in values))
+
+
+def _owned(function: Callable[..., Any], format_: Format | None) -> Callable[..., Any]:
+    """Return a function whose results are fixed-point numbers in place of floats."""
+    if format_ is None:
+        return function
+
+    def run(*values: Any) -> Any:
+        result = function(*values)
+        return format_.number(result) if isinstance(result, float | np.floating) else result
+
+    return run
+
+
+def begin(module: ModuleType, numbers: str = "") -> None:
+    """Give a module, before it runs, the functions that take the place of operators."""
+    format_ = format_of(numbers)
+    vars(module).update(
+        _firm_power=_owned(power, format_),
+        _firm_quotient=_owned(quotient, format_),
+        _firm_floor_quotient=floor_quotient,
+        _firm_remainder=remainder,
+        _firm_adopt=partial(_adopt, module, format_),
+        **_BUILTINS,
+    )
+    if format_:
+        vars(module).update(_firm_number=format_.number, float=lambda value=0: format_.number(value))
+
+
+def _adopt(module: ModuleType, format_: Format | None) -> None:
+    """Give a module the functions of hardware in place of those of `math` and NumPy that it has imported."""
     replaced: dict[int, Any] = {}
     for library, functions in ((math, _MATH), (np, _NUMPY)):
-        replaced |= {id(getattr(library, name)): function for name, function in functions.items()}
-        replaced[id(library)] = SimpleNamespace(**{**vars(library), **functions})
+        known = {**functions, **(_fixed(library, functions, format_) if format_ else {})}
+        replaced |= {id(getattr(library, name)): function for name, function in known.items()}
+        replaced[id(library)] = SimpleNamespace(**{**vars(library), **known})
     for name, value in [*vars(module).items()]:
         if id(value) in replaced:
             setattr(module, name, replaced[id(value)])
-    for name, function in _BUILTINS.items():
-        vars(module).setdefault(name, function)
 
 
-def begin(module: ModuleType) -> None:
-    """Give a module, before it runs, the functions that take the place of operators."""
-    vars(module).update(
-        _firm_power=power,
-        _firm_quotient=quotient,
-        _firm_floor_quotient=floor_quotient,
-        _firm_remainder=remainder,
-    )
+def _fixed(library: ModuleType, functions: Mapping[str, Callable[..., Any]], format_: Format) -> dict[str, Any]:
+    """Return the constants and functions of a library for fixed-point numbers."""
+    made: dict[str, Any] = {}
+    for full in CONSTANTS:
+        module, _, name = full.rpartition(".")
+        if module == library.__name__:
+            made[name] = format_.number(CONSTANTS[full])
+    for full in CALLS:
+        module, _, name = full.rpartition(".")
+        if module == library.__name__ and name not in _EXACT:
+            made[name] = partial(_through, functions.get(name, getattr(library, name)), format_)
+    return made | {name: getattr(library, name) for name in _EXACT if name in functions} | _types(library, format_)
+
+
+def _types(library: ModuleType, format_: Format) -> dict[str, Any]:
+    """Return the functions that take the place of NumPy's types of numbers."""
+    if library is not np:
+        return {}
+    integers = {name: partial(number_of, kind) for name, kind in INTEGERS.items()}
+    return {"float32": format_.number, "float64": format_.number, **integers}

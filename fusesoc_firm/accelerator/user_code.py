@@ -81,9 +81,12 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     return _loaded(path, name, what, (parameters, hint), run)
 
 
-def load_compiled(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
-    """Load the function of an accelerator that is compiled: it computes with the numbers of hardware."""
-    return _loaded(path, name, what, (parameters, hint), lambda module: _run_compiled(path, module))
+def load_compiled(path: Path, name: str, what: str, form: tuple[str, str], numbers: str = "") -> UserFunction:
+    """Load the function of an accelerator that is compiled: it computes with the numbers of hardware.
+
+    The `form` has the parameters and a hint, as those of `load_function`. Floats have the type `numbers`, if given.
+    """
+    return _loaded(path, name, what, form, lambda module: _run_compiled(path, module, numbers))
 
 
 def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callable[[ModuleType], None]) -> UserFunction:
@@ -109,15 +112,14 @@ def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callab
     return UserFunction(path, what, function)
 
 
-def _run_compiled(path: Path, module: ModuleType) -> None:
+def _run_compiled(path: Path, module: ModuleType, numbers: str) -> None:
     """Run a file of a compiled accelerator as a module."""
     # NumPy is imported only if it is needed.
-    from fusesoc_firm.accelerator.hardware_numbers import adopt, begin, prepared
+    from fusesoc_firm.accelerator.hardware_numbers import begin, prepared
 
-    begin(module)
-    tree = prepared(ast.parse(path.read_text(encoding="utf-8")))
+    begin(module, numbers)
+    tree = prepared(ast.parse(path.read_text(encoding="utf-8")), numbers)
     exec(compile(tree, str(path.absolute()), "exec"), vars(module))
-    adopt(module)
 
 
 def fail_missing(path: Path, function: str, what: str, hint: str) -> NoReturn:

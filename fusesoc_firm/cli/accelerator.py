@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,13 +122,14 @@ def _explore(arguments: argparse.Namespace) -> None:
 
 def _numbers(text: str) -> list[str]:
     """Return the types of numbers in an option."""
-    from fusesoc_firm.exploration.points import NUMBERS
+    from fusesoc_firm.system.written.specification import numbers_fault
 
-    names = [name.strip() for name in text.split(",")]
+    # A comma within parentheses is part of a type.
+    names = [*dict.fromkeys(name.strip() for name in re.split(r",(?![^(]*\))", text))]
     for name in names:
-        if name not in NUMBERS:
-            fail(f"'{name}' is not a type of numbers", hint=nearest(name, NUMBERS))
-    return [name for name in NUMBERS if name in names]
+        if fault := numbers_fault(name):
+            fail(f"--numbers {fault[0]}", hint=fault[1])
+    return names
 
 
 def _errors(arguments: argparse.Namespace, chosen: Chosen, numbers: Sequence[str]) -> tuple[dict[str, Accuracy], str]:

@@ -9,12 +9,13 @@ from functools import reduce
 from operator import getitem
 from typing import Any, NoReturn
 
+from fusesoc_firm.compiler.conversions import converted
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.interface import Elements, Leaf, Part, Side, places
 from fusesoc_firm.compiler.kinds import Kind
 from fusesoc_firm.compiler.paths import Loop
-from fusesoc_firm.compiler.values import Array, Maybe, Produced, Record, Stream, Unbound, Value, converted, described
+from fusesoc_firm.compiler.values import Array, Maybe, Produced, Record, Stream, Unbound, Value, described
 from fusesoc_firm.frame.model import Fixed, all_nodes, names_of
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
@@ -140,7 +141,7 @@ class AnswerMaker:
             self._refuse(f"field '{name}' has no value on one of the paths", "give it one on each path")
         if not isinstance(value, Node):
             self._refuse(f"field '{name}' is {described(value)}, not a number")
-        if value.kind.is_float and not kind.is_float:
+        if value.kind.is_real and not kind.is_float:
             self._refuse(
                 f"field '{name}' is an integer ({kind}), and the answer is a {value.kind}",
                 "convert it with int() or round()",

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted, integer_of, saturated, shifted
+from fusesoc_firm.compiler.fixed import FixedNumber, Format
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import (
     BOOL,
@@ -24,13 +26,13 @@ from fusesoc_firm.compiler.kinds import (
     INT,
     INTEGERS,
     Kind,
+    fixed_kind,
     integer_pair,
     number_of,
     pair_of,
     result_kind,
 )
 from fusesoc_firm.compiler.models import modelled
-from fusesoc_firm.compiler.values import UnmergeableError, common_kind, converted
 
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -85,10 +87,10 @@ class Arithmetic:
         result = self._result(_OPERATORS[kind], one, other)
         if kind in (ast.FloorDiv, ast.Mod):
             return self._quotient(kind, one, other, result)
-        pair = self._to(one, result), self._to(other, result)
-        if result.is_float:
-            return self._float(_NAMES[kind], *pair, result)
-        return self._integer(_NAMES[kind], *pair, result)
+        if self.graph.format and result.is_float and not one.kind.is_float and not other.kind.is_float:
+            raise RefusalError("a quotient of integers is not a fixed-point number", "convert one of them with float()")
+        compute = self._fixed if result.format else self._float if result.is_float else self._integer
+        return compute(_NAMES[kind], self._to(one, result), self._to(other, result), result)
 
     def _folded(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         try:
@@ -100,7 +102,7 @@ class Arithmetic:
             raise RefusalError(f"{value} has more than {_MOST_BITS} bits", "use a float")
         if isinstance(value, complex):
             raise RefusalError("a complex number is not hardware", "use two floats")
-        return self.graph.constant(value)
+        return self.literal(value)
 
     def _result(self, operation: Callable[..., Any], *operands: Node) -> Kind:
         """Return the kind of a result, as NumPy has it."""
@@ -112,6 +114,8 @@ class Arithmetic:
 
     def _to(self, value: Node, kind: Kind) -> Node:
         """Return an operand in the kind of its operation."""
+        if value.is_constant and kind.format and not value.kind.format and not kind.format.holds(value.payload):
+            raise RefusalError(*_out_of_range(value.payload, kind.format))
         if value.is_constant and value.kind == INT and kind in INTEGERS.values():
             low, high = kind.limits
             if not low <= value.payload <= high:
@@ -130,9 +134,28 @@ class Arithmetic:
         """Return a number in another kind, as `numpy.KIND(value)` converts it."""
         if kind == BOOL:
             return self.truth(value)
-        if value.kind.is_float and not kind.is_float:
+        if value.kind.is_real and not kind.is_real:
             return self._to(self.truncated(value), kind)
         return self._to(value, kind)
+
+    def literal(self, value: Any) -> Node:
+        """Return a number of the source: if the function computes with fixed-point numbers, a float is one."""
+        format_ = self.graph.format
+        if format_ is None or not isinstance(value, float | np.floating):
+            return self.graph.constant(value)
+        if not format_.holds(value):
+            raise RefusalError(*_out_of_range(value, format_))
+        return self.graph.constant(format_.number(value))
+
+    def own(self, value: Node) -> Node:
+        """Return the result of a function as a number of the source: if it computes with those, a fixed-point one."""
+        if self.graph.format is None or not value.kind.is_float:
+            return value
+        return self._to(value, fixed_kind(self.graph.format))
+
+    def real_to(self, value: Node, kind: Kind) -> Node:
+        """Return a number in a kind of floats, or as the fixed-point number that takes their place."""
+        return self.to(value, fixed_kind(self.graph.format) if self.graph.format else kind)
 
     def _float(self, name: str, one: Node, other: Node, kind: Kind) -> Node:
         if name == "subtract":
@@ -144,6 +167,23 @@ class Arithmetic:
             for item, rest in ((one, other), (other, one)):
                 if item.is_constant and abs(item.payload) == 1:
                     return rest if item.payload == 1 else self.negative(rest)
+        return self.graph.node(name, (one, other), kind)
+
+    def _fixed(self, name: str, one: Node, other: Node, kind: Kind) -> Node:
+        """Return the sum, the difference, the product or the quotient of fixed-point numbers."""
+        if name in ("add", "subtract"):
+            units = self._integer(name, integer_of(self.graph, one), integer_of(self.graph, other), INT)
+            return saturated(self.graph, units, kind)
+        if name == "divide" and other.is_constant and (inverse := _exact_fixed_inverse(other.payload)) is not None:
+            name, other = "multiply", self.graph.constant(inverse)
+        for item, rest in ((one, other), (other, one)) if name == "multiply" else ():
+            if item.is_constant and abs(item.low) == 1 << kind.fraction:
+                return rest if item.low > 0 else self.negative(rest)
+            places = _power_of_two(item.low) if item.is_constant else None
+            if places is not None and places >= kind.fraction:
+                return saturated(
+                    self.graph, shifted(self.graph, integer_of(self.graph, rest), places - kind.fraction), kind
+                )
         return self.graph.node(name, (one, other), kind)
 
     def _integer(self, name: str, one: Node, other: Node, kind: Kind) -> Node:
@@ -185,7 +225,7 @@ class Arithmetic:
         if not other.is_constant:
             raise RefusalError("the number of bits of a shift must be a constant", "use a loop over 'range' with 'if'")
         result, count = self._result(_OPERATORS[kind], one, other), int(other.payload)
-        if result.is_float or result == BOOL or count < 0:
+        if result.is_real or result == BOOL or count < 0:
             raise RefusalError("only integers are shifted, by 0 bits or more", "convert with int()")
         value = self._to(one, result)
         if kind is ast.LShift:
@@ -229,9 +269,9 @@ class Arithmetic:
         """Return a power with a constant exponent: products from the left, a square root, a quotient."""
         if not other.is_constant:
             raise RefusalError("the exponent of '**' must be a constant", "write the product, or math.sqrt")
-        exponent = other.payload
+        exponent = float(other.payload) if other.kind.is_real else other.payload
         if exponent == 0.5:
-            return self.square_root(one)
+            return self.own(self.square_root(one))
         if one.is_constant and exponent != int(exponent):
             return self._folded(ast.Pow, one, other)
         if exponent != int(exponent) or abs(exponent) > (_MOST_BITS if one.is_constant else _MOST_POWER):
@@ -239,9 +279,12 @@ class Arithmetic:
                 f"'** {exponent}' is not hardware", f"legal exponents: -{_MOST_POWER} to {_MOST_POWER}, and 0.5"
             )
         if exponent < 0:
-            return self.binary(ast.Div, self.graph.constant(1.0), self._power(one, self.graph.constant(-int(exponent))))
+            if self.graph.format and not one.kind.is_real:
+                raise RefusalError("a quotient of integers is not a fixed-point number", "convert it with float()")
+            inverse = self._power(one, self.graph.constant(-int(exponent)))
+            return self.binary(ast.Div, self.literal(1.0), inverse)
         # As for the product with a float exponent.
-        base = one if isinstance(exponent, int) else self._to(one, self._result(operator.pow, one, other))
+        base = one if isinstance(exponent, int) else self._to(one, self._result(operator.mul, one, other))
         result = base if exponent else self._to(self.graph.constant(1), base.kind)
         for _ in range(int(exponent) - 1):
             result = self.binary(ast.Mult, result, base)
@@ -253,14 +296,15 @@ class Arithmetic:
             raise RefusalError("a truth value has no negative", "use 'not', or convert it with int()")
         if not value.kind.is_float:
             zero = self._to(self.graph.constant(0), value.kind)
-            return self._integer("subtract", zero, value, value.kind)
+            subtract = self._fixed if value.kind.format else self._integer
+            return subtract("subtract", zero, value, value.kind)
         if value.operation == "negate":
             return value.operands[0]
         return self.graph.node("negate", (value,), value.kind)
 
     def inverted(self, value: Node) -> Node:
         """Return `~value`."""
-        if value.kind == BOOL or value.kind.is_float:
+        if value.kind == BOOL or value.kind.is_real:
             raise RefusalError(f"'~' of a {value.kind} is not hardware", "use 'not' for truth values")
         if value.is_constant:
             return self.graph.constant(~value.payload)
@@ -308,6 +352,9 @@ class Arithmetic:
         if one.kind.is_float or other.kind.is_float:
             kind = self._result(operator.add, one, other)
             return self._to(one, kind), self._to(other, kind)
+        if one.kind.format or other.kind.format:
+            kind = one.kind if one.kind.format else other.kind
+            return self._to(one, kind), self._to(other, kind)
         widened = [
             self.graph.node("wrap", (item,), INT, limits=(0, 1)) if item.kind == BOOL else item for item in (one, other)
         ]
@@ -345,9 +392,14 @@ class Arithmetic:
         return self.choose(self._less(value, self.graph.constant(0)), self.negative(value), value)
 
     def real(self, value: Node) -> Node:
-        """Return the operand of a function of `math`: a float32 remains one, every other number is a float64."""
+        """Return the operand of a function of `math`: a float32 remains one, every other number is a float64.
+
+        A fixed-point number becomes a float that holds it.
+        """
         if value.kind in (FLOAT32, FLOAT64, FLOAT):
             return value
+        if value.kind.format:
+            return self._to(value, FLOAT32 if value.kind.format.float_bits == 32 else FLOAT64)
         return self._to(value, FLOAT)
 
     def of_numpy(self, value: Node) -> Node:
@@ -418,18 +470,40 @@ class Arithmetic:
 
     def truncated(self, value: Node) -> Node:
         """Return `int(value)`; beyond 64 bits, hardware has the nearest integer of 64 bits, and 0 for NaN."""
+        if value.kind.format:
+            magnitude = self._whole_part(self.absolute(integer_of(self.graph, value)), value.kind.fraction)
+            return self.choose(self._less(value, self.graph.constant(0)), self.negative(magnitude), magnitude)
         if not value.kind.is_float:
             return self._to(value, INT)
         return self._to_integer(value, "truncate", math.trunc)
 
+    def _whole_part(self, units: Node, places: int) -> Node:
+        """Return units divided by 2**places, rounded down."""
+        if units.is_constant or not places:
+            return self.graph.constant(units.low >> places) if units.is_constant else units
+        return self.graph.node("shift_right", (units,), INT, places, (units.low >> places, units.high >> places))
+
     def rounded(self, value: Node) -> Node:
         """Return `round(value)`, ties to even."""
+        if value.kind.format:
+            return self._nearest(integer_of(self.graph, value), value.kind.fraction)
         if not value.kind.is_float:
             return value
         return self._to_integer(value, "nearest", round)
 
+    def _nearest(self, units: Node, places: int) -> Node:
+        """Return units divided by 2**places, rounded to nearest, ties to even."""
+        if not places:
+            return units
+        # A bit less than a half is added, and the lowest bit of the quotient.
+        odd = self.binary(ast.BitAnd, self._whole_part(units, places), self.graph.constant(1))
+        half = self.binary(ast.Add, odd, self.graph.constant((1 << places - 1) - 1))
+        return self._whole_part(self.binary(ast.Add, units, half), places)
+
     def floor(self, value: Node) -> Node:
         """Return `math.floor(value)`."""
+        if value.kind.format:
+            return self._whole_part(integer_of(self.graph, value), value.kind.fraction)
         if not value.kind.is_float:
             return self._to(value, INT)
         if value.is_constant:
@@ -440,6 +514,8 @@ class Arithmetic:
 
     def ceiling(self, value: Node) -> Node:
         """Return `math.ceil(value)`."""
+        if value.kind.format:
+            return self.negative(self._whole_part(self.negative(integer_of(self.graph, value)), value.kind.fraction))
         return self.negative(self.floor(self.negative(value)))
 
     def _to_integer(self, value: Node, rounding: str, folded: Callable[[Any], int]) -> Node:
@@ -487,6 +563,21 @@ _EXACT: Mapping[str, Callable[[int, int], int]] = {
 def _power_of_two(value: int) -> int | None:
     """Return the exponent of a positive power of two."""
     return value.bit_length() - 1 if value > 0 and value & (value - 1) == 0 else None
+
+
+def _out_of_range(value: Any, format_: Format) -> tuple[str, str]:
+    """Return the message and the remedy for a number that fixed-point numbers do not hold."""
+    least, most = (FixedNumber(format_, units) for units in format_.limits)
+    return f"{value} is out of the range of {format_}, {least} to {most}", "use more bits, or fewer of them as fraction"
+
+
+def _exact_fixed_inverse(value: FixedNumber) -> FixedNumber | None:
+    """Return the inverse of a power of two, if it is such a number, too."""
+    places = _power_of_two(abs(value.units))
+    if places is None or not 0 <= 2 * value.format.fraction - places < value.format.width - 1:
+        return None
+    inverse = FixedNumber(value.format, 1 << 2 * value.format.fraction - places)
+    return inverse if value.units > 0 else -inverse
 
 
 def _exact_inverse(kind: Kind, value: Any) -> Any:

@@ -108,7 +108,8 @@ class Expressions(Names):
             self.refuse(
                 node, f"{value!r} is not a number of hardware", "legal: integers of 64 bits, floats, truth values"
             )
-        return self.graph.constant(value)
+        found: Node = self.checked(node, self.arithmetic.literal, value)
+        return found
 
     def binary(self, node: ast.AST, kind: type[ast.operator], one: Value, other: Value) -> Value:
         """Return the result of an operator; lists and tuples are also joined and repeated."""
@@ -186,7 +187,9 @@ class Expressions(Names):
         match owner:
             case Named(name=module) if module in MODULES:
                 full = f"{module}.{name}"
-                return self.graph.constant(CONSTANTS[full]) if full in CONSTANTS else Named(full)
+                if full in CONSTANTS:
+                    return self.checked(node, self.arithmetic.literal, CONSTANTS[full])
+                return Named(full)
             case Named(name=module):
                 return Named(f"{module}.{name}")
             case Record():
@@ -265,7 +268,7 @@ class Expressions(Names):
     def integer(self, node: ast.expr) -> int:
         """Return the value of an expression that must be a constant integer."""
         value = self.expression(node)
-        if not isinstance(value, Node) or not value.is_constant or value.kind.is_float:
+        if not isinstance(value, Node) or not value.is_constant or value.kind.is_real:
             self.refuse(
                 node, "the number of turns is not a constant", "loop to a constant limit, with 'if' and 'break'"
             )
@@ -273,13 +276,13 @@ class Expressions(Names):
 
     def _position(self, index: Node, count: int, node: ast.AST) -> int:
         value = int(index.payload)
-        if index.kind.is_float or not -count <= value < count:
+        if index.kind.is_real or not -count <= value < count:
             self.refuse(node, f"{index.payload} is not an index of {count} elements")
         return value % count
 
     def _matches(self, index: Node, count: int, node: ast.AST) -> Iterator[tuple[int, Node]]:
         """Yield each index of a list, with the condition that it is this one; negative ones count from the end."""
-        if index.kind.is_float:
+        if index.kind.is_real:
             self.refuse(node, "an index must be an integer", "convert it with int()")
         for place in range(count):
             found = self.arithmetic.compare(ast.Eq, index, self.graph.constant(place))

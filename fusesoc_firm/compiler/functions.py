@@ -40,7 +40,7 @@ def _round(arithmetic: Arithmetic, values: list[Node]) -> Node:
 
 
 def _float(arithmetic: Arithmetic, values: list[Node]) -> Node:
-    return arithmetic.to(values[0], FLOAT)
+    return arithmetic.real_to(values[0], FLOAT)
 
 
 def _one(name: str) -> Call:
@@ -52,12 +52,20 @@ def _of_numpy(name: str) -> Call:
 
 
 def _typed(name: str) -> Call:
-    return Call(1, 1, lambda arithmetic, values: arithmetic.to(values[0], KINDS[name]))
+    kind = KINDS[name]
+    if kind.is_float:
+        return Call(1, 1, lambda arithmetic, values: arithmetic.real_to(values[0], kind))
+    return Call(1, 1, lambda arithmetic, values: arithmetic.to(values[0], kind))
+
+
+def _magnitude(arithmetic: Arithmetic, values: list[Node]) -> Node:
+    value = values[0]
+    return arithmetic.absolute(value if value.kind.format else arithmetic.real(value))
 
 
 _SHARED = {
     "sqrt": _one("square_root"),
-    "fabs": Call(1, 1, lambda arithmetic, values: arithmetic.absolute(arithmetic.real(values[0]))),
+    "fabs": Call(1, 1, _magnitude),
     "isnan": _one("is_nan"),
     "isinf": _one("is_infinite"),
     "isfinite": _one("is_finite"),
@@ -114,4 +122,4 @@ def called(name: str, arithmetic: Arithmetic, values: list[Node]) -> Node:
     if not call.fewest <= len(values) <= call.most:
         wanted = str(call.fewest) if call.fewest == call.most else f"{call.fewest} or more"
         raise RefusalError(f"'{name}' takes {wanted} numbers in hardware, not {len(values)}")
-    return call.make(arithmetic, values)
+    return arithmetic.own(call.make(arithmetic, values))

@@ -5,18 +5,19 @@
 | constant | - | `payload`, the number |
 | input | - | the bits of a port that `payload` names |
 | state, carried, final | - | a register: of a state, of a value between the elements of a loop, and after the loop |
-| add, subtract, multiply, divide, square_root | numbers of the result's kind | correctly rounded |
+| add, subtract, multiply, divide, square_root | numbers of the result's kind | correctly rounded; saturated, if fixed |
 | atan2, exp, log | floats of the result's kind | that of the operator's model |
 | sincos | a float | a pair: its sine and its cosine, those of the operator's model |
 | divmod | two integers | a pair: the quotient, rounded down, and the remainder; both 0 by zero |
 | sine, cosine, quotient, remainder | the pair | one of its numbers |
-| to_float, to_integer, resize | a number of another kind | the nearest number; towards zero |
+| to_float, to_integer, resize | a number of another kind | the nearest number; towards zero, if `payload` tells so |
 | less, at_most, equal | two numbers of one kind, or integers | a truth value |
 | negate, absolute, copy_sign | floats | by bits |
 | choose | condition, number if true, number if false | the number |
 | and, or, xor, invert | integers or truth values | by bits |
 | shift_left, shift_right | an integer; `payload` bits | the integer |
 | wrap | an integer | the same, in another width |
+| saturate | an integer | the nearest fixed-point number |
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from typing import Any
 
 import numpy as np
 
-from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, bits_of, kind_of, number_of
+from fusesoc_firm.compiler.fixed import Format
+from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, bits_of, kind_of, number_of, units_of
 
 LEAVES = ("constant", "input", "state", "carried", "final")
 """The operations without operands."""
@@ -112,8 +114,12 @@ _COMMUTATIVE = ("add", "multiply", "equal", "and", "or", "xor")
 
 @dataclass
 class Graph:
-    """All nodes of a function in the order of their creation, so operands precede their users."""
+    """All nodes of a function in the order of their creation, so operands precede their users.
 
+    With a `format`, the function computes with fixed-point numbers in place of floats.
+    """
+
+    format: Format | None = None
     nodes: list[Node] = field(default_factory=list)
     place: Place | None = None
     _known: dict[Any, Node] = field(default_factory=dict)
@@ -121,7 +127,7 @@ class Graph:
     def constant(self, value: Any) -> Node:
         """Return a constant."""
         kind = kind_of(value)
-        low = high = 0 if kind.is_float else int(value)
+        low = high = 0 if kind.is_float else units_of(value)
         # Zeros of both signs and NaN are constants of their own.
         key = ("constant", kind, low, bits_of(kind, value, 64))
         return self._node(key, Node(len(self.nodes), "constant", (), kind, value, low, high))

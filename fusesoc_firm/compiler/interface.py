@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from fusesoc_firm.compiler.conversions import converted
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import INT, KINDS, Kind
-from fusesoc_firm.compiler.values import Array, Memory, Record, Stream, Value, converted
+from fusesoc_firm.compiler.values import Array, Memory, Record, Stream, Value
 from fusesoc_firm.converter.message_ports import (
     ElementPorts,
     MessagePort,

@@ -13,12 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from fusesoc_firm.compiler.fixed import FixedNumber, Format, format_of
+
 
 @dataclass(frozen=True)
 class Kind:
     """A type of numbers with `bits` bits; `is_weak` marks Python's own int and float.
 
-    The bits of a weak integer depend on the range of its values; `bits` is their limit.
+    The bits of a weak integer depend on the range of its values; `bits` is their limit. A fixed-point number has a
+    `format`, and is an integer in hardware.
     """
 
     name: str
@@ -26,6 +29,17 @@ class Kind:
     is_float: bool = False
     is_signed: bool = True
     is_weak: bool = False
+    format: Format | None = None
+
+    @property
+    def is_real(self) -> bool:
+        """Whether numbers have fractions."""
+        return self.is_float or self.format is not None
+
+    @property
+    def fraction(self) -> int:
+        """The bits of the fraction of a fixed-point number, and 0 of an integer."""
+        return self.format.fraction if self.format else 0
 
     @property
     def mantissa_bits(self) -> int:
@@ -61,6 +75,17 @@ INTEGERS = {
 KINDS = {kind.name: kind for kind in (BOOL, FLOAT32, FLOAT64, *INTEGERS.values())}
 
 
+def fixed_kind(format_: Format) -> Kind:
+    """Return the kind of fixed-point numbers."""
+    return Kind(str(format_), format_.width, format=format_)
+
+
+def kind_named(text: str) -> Kind | None:
+    """Return the kind with a name, such as float32 or fixed(16, 8), or None for another text."""
+    format_ = format_of(text)
+    return fixed_kind(format_) if format_ else KINDS.get(text)
+
+
 def pair_of(kind: Kind) -> Kind:
     """Return the kind of two numbers that one operator computes; no variable has it."""
     return Kind(f"{kind}_pair", 2 * kind.bits, kind.is_float)
@@ -74,13 +99,15 @@ def integer_pair(bits: int) -> Kind:
 
 def is_number(value: object) -> bool:
     """Whether a value is a number or a truth value that hardware can hold."""
-    return isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating)
+    return isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating | FixedNumber)
 
 
 def kind_of(value: object) -> Kind:
     """Return the kind of a number."""
     if isinstance(value, bool | np.bool_):
         return BOOL
+    if isinstance(value, FixedNumber):
+        return fixed_kind(value.format)
     # A float64 of NumPy is also a float of Python.
     if isinstance(value, np.generic):
         return KINDS[value.dtype.name]
@@ -96,6 +123,8 @@ def number_of(kind: Kind, value: Any) -> Any:
             return int(value)
         case Kind(name="pyfloat"):
             return float(value)
+        case Kind(format=Format() as format_):
+            return format_.number(value)
         case Kind(is_float=True):
             return getattr(np, kind.name)(value)
     # The integers of hardware wrap.
@@ -108,10 +137,15 @@ def result_kind(operation: Callable[..., Any], *kinds: Kind) -> Kind:
         return kind_of(operation(*(number_of(kind, 1) for kind in kinds)))
 
 
+def units_of(value: Any) -> int:
+    """Return the integer that hardware has for an integer, a truth value or a fixed-point number."""
+    return value.units if isinstance(value, FixedNumber) else int(value)
+
+
 def bits_of(kind: Kind, value: Any, width: int) -> int:
     """Return the bits of a number in hardware, as an unsigned integer; `width` is the width of an integer."""
     if not kind.is_float:
-        return int(value) % (1 << width)
+        return units_of(value) % (1 << width)
     kept = np.float32(value) if kind.bits == 32 else np.float64(value)
     # The only NaN of hardware is the positive quiet NaN.
     if math.isnan(kept):

@@ -8,6 +8,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from fusesoc_firm.compiler.functions import CONSTANTS
 from fusesoc_firm.compiler.paths import Paths
 from fusesoc_firm.compiler.values import Class, Function, Named, Unbound, Value
 from fusesoc_firm.text.diagnostics import nearest
@@ -55,7 +56,8 @@ class Names(Paths):
                 return next(Named(item.name) for item in names if name in _names_of(item))
             case ast.ImportFrom(module=module, names=names):
                 original = next(item.name for item in names if (item.asname or item.name) == name)
-                return Named(f"{module}.{original}")
+                full = f"{module}.{original}"
+                return self.arithmetic.literal(CONSTANTS[full]) if full in CONSTANTS else Named(full)
             case ast.Assign(targets=[ast.Name()], value=given) | ast.AnnAssign(value=ast.expr() as given):
                 with self._own_frame():
                     return self.expression(given)

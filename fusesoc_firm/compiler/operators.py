@@ -1,4 +1,4 @@
-"""The operators of `robot:acc:firm_float` and `robot:acc:firm_python`, as their `operators.yaml` describe them."""
+"""The operators of `robot:acc:firm_float`, `firm_fixed` and `firm_python`, as their `operators.yaml` describe them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from fusesoc_firm.compiler.fixed import MOST_BITS
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import Kind
 from fusesoc_firm.tools.library_path import library_root
@@ -27,6 +28,8 @@ _NAMES = {
 }
 # Those with two results.
 _PAIRS = ("sincos", "divmod")
+# The sizes of fixed-point operators that are measured.
+_FIXED_BITS = (16, 24, 32, MOST_BITS)
 # The widths of integers that are converted; one operator converts all that are not wider.
 _WIDTHS = (32, 64, 65)
 SHORT = "short"
@@ -67,7 +70,7 @@ class Operator:
 
 def table_files() -> list[Path]:
     """Return the paths of the descriptions of all operators."""
-    return [library_root() / "cores" / "acc" / core / "operators.yaml" for core in ("float", "python")]
+    return [library_root() / "cores" / "acc" / core / "operators.yaml" for core in ("float", "fixed", "python")]
 
 
 @cache
@@ -81,7 +84,7 @@ def _table() -> Mapping[str, Any]:
 def is_operator(node: Node) -> bool:
     """Whether an operator computes the node, which other nodes may share."""
     if node.operation in ("add", "multiply", "divide"):
-        return node.kind.is_float
+        return node.kind.is_real
     return node.operation in _NAMES
 
 
@@ -89,13 +92,14 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
     """Return the operator that computes a node; `form` is preferred, if the operator has it."""
     of_operand = node.operation in ("to_integer", "resize", "sincos")
     size = node.operands[0].kind if of_operand else node.kind
-    description = _table()[_NAMES[node.operation]]
+    description = _table()[_NAMES[node.operation] if size.is_float or not size.format else f"fixed_{node.operation}"]
     forms = description["forms"]
     width, generics = _width(node)
     facts = forms.get(form, forms["default"])[f"int{width}" if node.operation == "divmod" else _size(size)]
     latency = facts["latency"]
     if not isinstance(latency, int):
         latency = next(cycles for most, cycles in latency.items() if width <= most)
+    latency += facts.get("digit", 0) * (size.bits + size.fraction)
     ports = tuple(name for name, type_ in description["inputs"].items() if type_ != "bit")
     results = tuple(description["outputs"]) if node.operation in _PAIRS else (next(iter(description["outputs"])),)
     return Operator(
@@ -113,6 +117,8 @@ def operator_of(node: Node, form: str = SHORT) -> Operator:
 
 
 def _size(kind: Kind) -> str:
+    if kind.format:
+        return next(f"fixed{bits}" for bits in _FIXED_BITS if kind.bits <= bits)
     return "float32" if kind.bits == 32 else "float64"
 
 
@@ -124,8 +130,14 @@ def _width(node: Node) -> tuple[int, tuple[tuple[str, str], ...]]:
         value = node.operands[0]
         needed = value.bits + (not value.is_signed)
         width = next(item for item in _WIDTHS if needed <= item)
-        return width, (("WIDTH", str(width)), ("FRACTION", "0"))
+        return width, (("WIDTH", str(width)), ("FRACTION", str(value.kind.fraction)))
     if node.operation == "to_integer":
         truncates = "true" if node.payload == "truncate" else "false"
-        return node.bits, (("WIDTH", str(node.bits)), ("FRACTION", "0"), ("TRUNCATES", truncates))
+        fraction = str(node.kind.fraction)
+        return node.bits, (("WIDTH", str(node.bits)), ("FRACTION", fraction), ("TRUNCATES", truncates))
+    if node.kind.format:
+        generics = {"WIDTH": node.kind.bits, "FRACTION": node.kind.fraction}
+        return node.kind.bits, tuple(
+            (f"{port}_{name}", str(value)) for port in ("A", "B", "OUT") for name, value in generics.items()
+        )
     return node.kind.bits, ()

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 from fusesoc_firm.compiler.arithmetic import Arithmetic, RefusalError
+from fusesoc_firm.compiler.conversions import UnmergeableError
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.source import Source
-from fusesoc_firm.compiler.values import Array, Memory, Merge, Stream, UnmergeableError, Value
+from fusesoc_firm.compiler.values import Array, Memory, Merge, Stream, Value
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from itertools import chain
 from typing import Any, NoReturn
 
 from fusesoc_firm.compiler.answers import Answer, AnswerMaker, Made
+from fusesoc_firm.compiler.conversions import UnmergeableError, converted, widened
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.interface import Side, message_value
@@ -15,19 +16,7 @@ from fusesoc_firm.compiler.kinds import Kind, number_of
 from fusesoc_firm.compiler.paths import Carried, Loop
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.streaming import problems
-from fusesoc_firm.compiler.values import (
-    Array,
-    Class,
-    Function,
-    Instance,
-    Named,
-    Record,
-    UnmergeableError,
-    Value,
-    converted,
-    described,
-    widened,
-)
+from fusesoc_firm.compiler.values import Array, Class, Function, Instance, Named, Record, Value, described
 from fusesoc_firm.text.diagnostics import nearest
 
 _MOST_ROUNDS = 20
@@ -150,11 +139,13 @@ class _Run:
         self.name, self.inputs, self.outputs, self.states = task.name, task.inputs, task.outputs, states
         self.interpreter = Interpreter(task.source, on_global=self._enter)
         self.graph = self.interpreter.graph
+        self.graph.format = task.numbers.format if task.numbers else None
         self.first: dict[str, Value] = {}
         self.next: dict[str, Node] = {}
         self.leaves: dict[str, Node] = {}
         function = self._function()
         memory = self.interpreter.memory
+        self.graph.place = task.source.line(function.definition)
         messages = [message_value(side, self.graph, memory, task.numbers) for side in task.inputs]
         self.node = function.definition
         self.result = self.interpreter.call(function, messages, {}, self.node)

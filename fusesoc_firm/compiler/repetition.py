@@ -12,21 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fusesoc_firm.compiler.calls import Calls
+from fusesoc_firm.compiler.conversions import converted, widened
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import INT
 from fusesoc_firm.compiler.paths import Carried, Loop, Turns
-from fusesoc_firm.compiler.values import (
-    Array,
-    Memory,
-    Produced,
-    Record,
-    Stream,
-    Unbound,
-    Value,
-    converted,
-    described,
-    widened,
-)
+from fusesoc_firm.compiler.values import Array, Memory, Produced, Record, Stream, Unbound, Value, described
 
 _MOST_TURNS = 4096
 # The most rounds until the kinds of the carried values of a loop are known: each is widened a few times.

@@ -233,7 +233,7 @@ def _delay(node: Node) -> int:
             return _LOGIC
         case "choose":
             return _CHOICE if node.kind != BOOL else _LOGIC
-        case "equal":
+        case "equal" | "saturate":
             return _EQUALITY
         case "less" | "at_most" | "add" | "subtract":
             return int(_CARRY + _PER_BIT * operand.bits)

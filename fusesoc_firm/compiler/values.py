@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.kinds import BOOL, Kind, number_of, result_kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +88,6 @@ class Unbound:
     name: str
 
 
-class UnmergeableError(Exception):
-    """Two paths leave values that no hardware can hold in one place."""
-
-
 Value = Any
 """A `Node`, a tuple, a text, None, or a value of one of the classes above."""
 
@@ -114,49 +110,6 @@ class Memory:
     def items(self, array: Array) -> list[Value]:
         """Return the elements of a list."""
         return [*self.cells[array].values()]
-
-
-def converted(graph: Graph, value: Node, kind: Kind) -> Node:
-    """Return a number converted to another kind, as an operation with this kind converts its operands."""
-    if value.kind == kind:
-        return value
-    if value.is_constant:
-        return graph.constant(number_of(kind, value.payload))
-    if kind.is_float:
-        if value.kind.is_float:
-            return _resized(graph, value, kind)
-        return graph.node("to_float", (value,), kind)
-    if kind == BOOL:
-        raise UnmergeableError(f"a {value.kind} and a truth value")
-    limits = (value.low, value.high)
-    return graph.node("wrap", (value,), kind, limits=limits)
-
-
-def _resized(graph: Graph, value: Node, kind: Kind) -> Node:
-    """Return a float of another kind; Python's float has the bits of a float64."""
-    return graph.node("rename" if value.kind.bits == kind.bits else "resize", (value,), kind)
-
-
-def common_kind(one: Kind, other: Kind) -> Kind:
-    """Return the kind of a name that has one kind on one path, and another one on another path."""
-    if one == other:
-        return one
-    if BOOL in (one, other):
-        raise UnmergeableError(f"a {one} and a {other}")
-    return result_kind(lambda a, b: a + b, one, other)
-
-
-def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:
-    """Return the kind and limits of a number that is `first`, and is replaced by `after` again and again.
-
-    `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
-    """
-    kind = common_kind(first.kind, after.kind)
-    if kind.is_float:
-        return kind, 0, 0
-    limits = min(first.low, after.low), max(first.high, after.high)
-    # A number that grows beyond expectation may grow each time.
-    return (kind, *(kind.limits if known and limits != known[1:] else limits))
 
 
 @dataclass(frozen=True)

@@ -163,6 +163,8 @@ class Writer:
                 return f"{given[0]} {node.operation} {given[1]}"
             case "less" | "at_most" | "equal":
                 return self._comparison(node, given)
+            case "saturate":
+                return _vector(f"saturated({_number(node.operands[0], given[0], node.operands[0].bits)}, {node.bits})")
         one, other = (_number(item, text, node.bits) for item, text in zip(node.operands, given, strict=True))
         if node.operation == "multiply":
             return _vector(f"fitted({one} * {other}, {node.bits})")

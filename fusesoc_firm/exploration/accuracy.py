@@ -113,7 +113,7 @@ def _answers(type_: AcceleratorType, folder: Path, calls: Sequence[Call], number
     """Yield the answers to all calls, as they are sent."""
     path, what = folder / type_.accelerator.sources[0], f"'{function_name(type_)}'"
     names = ", ".join(parameter_names(type_))
-    function = load_compiled(path, function_name(type_), what, names, f"expected: {prototype(type_)}")
+    function = load_compiled(path, function_name(type_), what, (names, f"expected: {prototype(type_)}"), numbers)
     for number, call in enumerate(calls):
         when = f"message {number}, with numbers: {numbers}"
         with silent():

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.compiler.fixed import MOST_BITS, format_of
 from fusesoc_firm.compiler.program import Program
 from fusesoc_firm.compiler.schedule import Schedule, scheduled
 from fusesoc_firm.system.derived.model import AcceleratorType
@@ -16,11 +17,9 @@ from fusesoc_firm.system.hardware.estimate import Estimate, estimate
 from fusesoc_firm.system.hardware.limits import counts_to_try, used
 from fusesoc_firm.text.diagnostics import InputError
 
-NUMBERS = ("float32", "float64")
-"""The types of numbers that can be explored."""
 FIELDS, ANY = "fields", "any"
 """The numbers of a function whose fields have several types, and those of one to which they do not matter."""
-# A point may be beaten by one with the same or a later type.
+# A point may be beaten by one with the same or a later type; fixed-point numbers precede them by their bits.
 _BY_WIDTH = ("float32", FIELDS, "float64", ANY)
 
 Tell = Callable[[str], None]
@@ -52,7 +51,7 @@ class Point:
     def costs(self) -> tuple[int, ...]:
         """What a better point has less of: cycles, cells, and rounding."""
         size = self.estimate
-        return self.schedule.latency, self.elements, size.lut, size.ff, size.dsp, -_BY_WIDTH.index(self.numbers)
+        return self.schedule.latency, self.elements, size.lut, size.ff, size.dsp, -_rank(self.numbers)
 
     def data(self) -> dict[str, Any]:
         """Return the point as plain data."""
@@ -79,8 +78,12 @@ def explored(type_: AcceleratorType, folder: Path, numbers: Sequence[str], tell:
         for counts in counts_to_try(program, {}):
             tell(f"scheduling {name}: {', '.join(f'{count} {kind}' for kind, count in counts.items())}")
             found.append(_point(name, scheduled(program, counts)))
-    order = [*_BY_WIDTH]
-    return _with_front(sorted(_distinct(found), key=lambda item: (order.index(item.numbers), item.costs)))
+    return _with_front(sorted(_distinct(found), key=lambda item: (_rank(item.numbers), item.costs)))
+
+
+def _rank(numbers: str) -> int:
+    format_ = format_of(numbers)
+    return format_.width - MOST_BITS if format_ else 1 + _BY_WIDTH.index(numbers)
 
 
 def _current(type_: AcceleratorType, folder: Path) -> Schedule | None:

@@ -20,7 +20,7 @@ from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed
 from fusesoc_firm.accelerator.user_code import load_compiled
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
-from fusesoc_firm.compiler.kinds import KINDS
+from fusesoc_firm.compiler.kinds import kind_named
 from fusesoc_firm.compiler.program import Program, Task, compile_function
 from fusesoc_firm.compiler.schedule import Schedule, scheduled
 from fusesoc_firm.compiler.source import Source
@@ -73,9 +73,10 @@ class Unit:
     limits: Mapping[str, int] = field(default_factory=dict, hash=False)
 
     def program(self, frame: Frame = FRAME) -> Program:
-        numbers = KINDS[self.numbers] if self.numbers else None
         source = Source(f"{self.name}.py", self.text)
-        return compile_function(Task(source, self.name, [side_of("in_", frame)], [side_of("out_", frame)], numbers))
+        return compile_function(
+            Task(source, self.name, [side_of("in_", frame)], [side_of("out_", frame)], kind_named(self.numbers))
+        )
 
     def schedule(self) -> Schedule:
         return scheduled(self.program(), self.limits)
@@ -96,7 +97,7 @@ class Unit:
         """The answers of the function itself."""
         path = folder / f"{self.name}.py"
         path.write_text(self.text, encoding="utf-8")
-        function = load_compiled(path, self.name, self.name, "m", "")
+        function = load_compiled(path, self.name, self.name, ("m", ""), self.numbers)
         found: list[dict[str, Any] | None] = []
         for message in messages:
             with silent():
@@ -165,7 +166,9 @@ def simulated(
 ) -> dict[Unit, list[dict[str, Any] | None]]:
     """The answers of the hardware of all units to all messages."""
     firm, work = Library("firm", folder), Library("work", folder)
-    firm.analyse(core_files("axis/package", "acc/cordic/cordic", "acc/float/float", "acc/python/python"))
+    firm.analyse(
+        core_files("axis/package", "acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed", "acc/python/python")
+    )
     for unit in units:
         (folder / f"{unit.name}.vhd").write_text(unit.vhdl(), encoding="utf-8")
     (inputs, in_bits), (outputs, out_bits) = placed_bits("in_"), placed_bits("out_")

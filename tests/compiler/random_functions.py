@@ -22,6 +22,9 @@ class RandomFunction:
     singles: list[str] = field(default_factory=lambda: ["m.c", "m.d", "self.y"])
     integers: list[str] = field(default_factory=lambda: ["m.i", "m.j", "self.n"])
     bools: list[str] = field(default_factory=lambda: ["m.p", "m.q"])
+    # The largest constants; fixed-point numbers hold less than floats do.
+    large: str = "1e6"
+    huge: str = "1e300"
     divisions: int = 0
     angles: int = 0
 
@@ -34,13 +37,13 @@ class RandomFunction:
 import numpy as np
 
 
-def limited(x, low, high=1e6):
+def limited(x, low, high={self.large}):
     return low if x < low else high if x > high else x
 
 
 class Random:
     def __init__(self):
-        self.x = {self.source.choice(["0.0", "-1.5", "1e300"])}
+        self.x = {self.source.choice(["0.0", "-1.5", self.huge])}
         self.y = np.float32({self.source.choice(["0.0", "2.5"])})
         self.n = np.int32({self.source.randint(-5, 5)})
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.compiler.fixed import MOST_BITS
 from tests.compiler.compiled import Unit, differences, message_frame, random_messages, simulated
 from tests.compiler.random_functions import RandomFunction
 
@@ -93,6 +94,63 @@ state = State()
 """,
 }
 
+_FIXED = {
+    "filtered": """
+import math
+from math import pi
+
+THIRD = 1 / 3
+TWO_PI = 2 * math.pi
+
+
+class Filter:
+    def __init__(self):
+        self.s = 0.0
+        self.past = [0.0] * 3
+
+    def __call__(self, m):
+        self.s += 0.25 * m.a
+        self.past = [m.c, *self.past[:2]]
+        best = math.inf
+        for x in m.v:
+            if x < best:
+                best = x
+        return {
+            "a": self.s, "b": m.a * m.b - m.c * THIRD + 2, "c": m.c / m.d, "d": pi - abs(m.d) - TWO_PI, "i": int(m.a),
+            "j": round(m.b), "n": math.floor(m.c) * 1000 + math.ceil(m.d), "p": m.a < 100, "q": m.c >= m.d,
+            "v": [best, max(m.v) * -4.0, m.a / 8.0 + m.i], "k": np_uint8(m.v[0]),
+            "w": [int(m.v[1] * 2), round(m.v[2] / 4), int(sum(self.past)), m.p + 1],
+        }
+
+
+from numpy import uint8 as np_uint8
+
+filtered = Filter()
+""",
+    "roots": """
+import math
+
+
+def roots(m):
+    return {
+        "a": math.sqrt(abs(m.a)), "b": m.b ** 0.5, "c": m.c ** 2.0 + m.i ** 2.0, "d": math.atan2(m.c, m.d),
+        "v": [math.hypot(m.a, m.b), math.sin(m.c), 1 / m.d], "p": math.isinf(m.a), "q": math.isfinite(m.b),
+    }
+""",
+}
+
+_CONSTANTS = """
+import math
+import numpy as np
+
+ANGLE = math.sin(1.1) * np.exp(np.float32(0.3)) + int(2.7)
+THIRD = 7 // 3 + 2 ** 0.5
+
+
+def constants(m):
+    return {"a": ANGLE, "b": THIRD * m.a, "c": np.float32(ANGLE)}
+"""
+
 _ANGLES = """
 import math
 import numpy as np
@@ -137,6 +195,40 @@ def test_random_functions_answer_as_python_does(functions: int, messages: int, s
             Unit(f"f{number}", RandomFunction(source, f"f{number}").text(), limits={"add": 1 + number % 2})
             for number in range(functions)
         ]
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        check(units, messages, folder, seed)
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("numbers", ["fixed(16, 8)", "fixed(48, 30)", "fixed(20, 0)", "fixed(9, 4)"])
+def test_fixed_point_numbers_are_rounded_and_saturated(numbers: str, tmp_path: Path) -> None:
+    names = ["filtered"] if numbers in ("fixed(20, 0)", "fixed(9, 4)") else [*_FIXED]
+    check([Unit(name, _FIXED[name].replace("100", "10"), numbers) for name in names], 40, tmp_path, _SEED)
+
+
+def test_constants_of_the_module_have_the_results_of_the_models(tmp_path: Path) -> None:
+    unit, (message,) = Unit("constants", _CONSTANTS), random_messages(random.Random(1), 1)
+    (answer,) = unit.program().answers
+    (found,) = unit.expected([message], tmp_path)
+    assert found
+    values = {port: nodes[0] for port, nodes in answer.fields.items()}
+    assert [values[f"out_{name}"].payload for name in "ac"] == [found["a"], found["c"]]
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    ("functions", "messages", "seeds"),
+    [(2, 20, range(1, 3)), pytest.param(10, 60, range(1, 31), marks=pytest.mark.thorough)],
+)
+def test_random_functions_of_fixed_point_numbers(functions: int, messages: int, seeds: range, tmp_path: Path) -> None:
+    for seed in seeds:
+        source = random.Random(seed)
+        # The constants of the functions are below 100.
+        width = source.randint(9, MOST_BITS)
+        numbers = f"fixed({width}, {source.randint(0, width - 8)})"
+        texts = [RandomFunction(source, f"f{number}", large="7.5", huge="9").text() for number in range(functions)]
+        units = [Unit(f"f{number}", text, numbers, {"multiply": 1 + number % 2}) for number, text in enumerate(texts)]
         folder = tmp_path / str(seed)
         folder.mkdir()
         check(units, messages, folder, seed)

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from fusesoc_firm.compiler.interface import side_of
+from fusesoc_firm.compiler.kinds import kind_named
 from fusesoc_firm.compiler.program import Task, compile_function
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.text.diagnostics import InputError
@@ -51,6 +52,7 @@ BODIES = [
     ("x = @math.gamma(m.low)", "'math.gamma' is not hardware", "legal here: acos"),
     ("x = @math.sqrt(m.low, 2)", "'math.sqrt' takes 1 numbers", ""),
     ("x = @print(m.n)", "'print' is not hardware", ""),
+    ("x = @math.inf // m.n", "'//' and '%' of floats", "math.floor"),
     ("x = @missing + 1", "the name 'missing' has no value", ""),
     ("x = @m.lwo", "the message has no field 'lwo'", "did you mean 'low'"),
     ("x = m[@'lwo']", "the message has no field 'lwo'", "did you mean 'low'"),
@@ -103,9 +105,10 @@ def tried(m):
 """
 
 
-def compiled(body: str, length: str = "buffered") -> None:
+def compiled(body: str, length: str = "buffered", numbers: str = "") -> None:
     text = _HEAD + "".join(f"    {line}\n" for line in body.split("\n"))
-    compile_function(Task(Source("tried.py", text), "tried", [side_of("in_", SCAN)], [side_of("out_", ANSWER, length)]))
+    sides = [side_of("in_", SCAN)], [side_of("out_", ANSWER, length)]
+    compile_function(Task(Source("tried.py", text), "tried", *sides, kind_named(numbers)))
 
 
 @pytest.mark.parametrize(("body", "message", "remedy"), BODIES)
@@ -143,6 +146,26 @@ def test_a_length_that_comes_late_is_refused(length: str, answer: str, message: 
     with pytest.raises(InputError, match=message) as raised:
         compiled(f"return {answer}", length)
     assert "length: buffered" in raised.value.diagnostics[0].hint
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        ("m.low * 1000.0", r"1000.0 is out of the range of fixed\(12, 4\), -128.0 to 127.9375"),
+        ("m.low + 300", "300 is out of the range of"),
+        ("m.n / 3", "a quotient of integers is not a fixed-point number"),
+        ("m.n ** -2", "a quotient of integers is not a fixed-point number"),
+        ("~m.low", r"'~' of a fixed\(12, 4\) is not hardware"),
+        ("m.low << 2", "there is no such operation on a fixed"),
+        ("m.low // 2", "there is no such operation on a fixed"),
+        ("m.low & 3", "there is no such operation on a fixed"),
+        ("m.v[m.low]", "an index must be an integer"),
+    ],
+)
+def test_what_fixed_point_numbers_do_not_hold_is_refused(expression: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as raised:
+        compiled(f"return {{'x': {expression}}}", numbers="fixed(12, 4)")
+    assert raised.value.diagnostics[0].hint
 
 
 def test_a_recursion_is_refused_at_its_call() -> None:

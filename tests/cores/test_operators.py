@@ -9,6 +9,7 @@ import re
 from typing import Any
 
 import pytest
+import yaml
 
 from tests.cores.operators import FORMS, OPERATORS, Form
 from tests.hdl.ghdl import CORES, REPOSITORY
@@ -47,6 +48,15 @@ def test_figures_are_the_measured_ones(form: Form) -> None:
     (line,) = (cells for cells in map(_cells, _FIGURES.splitlines()) if cells[:2] == [design, bits[form.size]])
     megahertz, _, lut, ff = line[2:6]
     assert (megahertz, lut, ff) == tuple(str(form.facts[name]) for name in ("megahertz", "lut", "ff"))
+
+
+@pytest.mark.parametrize("operation", ["multiply", "divide"])
+def test_figures_of_fixed_point_operators_are_the_measured_ones(operation: str) -> None:
+    file = CORES / "acc" / "fixed" / "operators.yaml"
+    forms = yaml.safe_load(file.read_text(encoding="utf-8"))["operators"][f"fixed_{operation}"]["forms"]["default"]
+    lines = [_cells(line) for line in _FIGURES.splitlines() if line.startswith(f"| firm_fixed_{operation} ")]
+    figures = {size: [str(facts[name]) for name in ("megahertz", "lut", "ff")] for size, facts in forms.items()}
+    assert figures == {f"fixed{cells[1]}": [cells[2], *cells[4:6]] for cells in lines}
 
 
 @pytest.mark.parametrize("operator", [name for name in OPERATORS if name not in ("resize", "from_fixed", "to_fixed")])

@@ -184,7 +184,7 @@ def test_a_picture_has_a_circle_for_each_point(tmp_path: Path, capsys: Captured)
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--numbers", "float16"], "'float16' is not a type of numbers"),
+        (["--numbers", "float16"], "--numbers cannot be 'float16'"),
         (["--svg", "points.png"], "cannot write points.png: unknown file extension"),
         (["--topic", "/x"], "--topic names a topic of a bag"),
         (["--stimuli", "missing.yaml"], "the stimuli missing.yaml do not exist"),

@@ -41,7 +41,8 @@ _NOTES = {
     _SYSTEMS_TITLE: """In the systems of a subscriber and a publisher for each message, messages are passed through, and
         `clock` in the specification is the bar. The others are the demo systems.""",
     _ARITHMETIC_TITLE: """The entities of [Arithmetic](../reference/arithmetic.md) for float64 and float32, with
-        fixed-point numbers of 32 bits, and the division of integers. Multipliers (MULT18X18D) are not counted.""",
+        fixed-point numbers, half of their bits as fraction, and the division of integers. Multipliers
+        (MULT18X18D) are not counted.""",
     _LOOP_TITLE: "The path from a grant through the Manager and back to the scheduler is included.",
 }
 
@@ -296,8 +297,13 @@ def _arithmetic() -> Iterator[Row]:
             for name, bits in zip(("EXPONENT_BITS", "MANTISSA_BITS"), _FLOATS[size], strict=True)
         }
         yield Row(f"firm_float_resize to {other} bits", width, _operation("firm_float_resize", generics))
-    for entity in "firm_fixed_add", "firm_fixed_multiply", "firm_fixed_divide", "firm_fixed_resize":
+    for entity in "firm_fixed_add", "firm_fixed_resize":
         yield Row(entity, 32, _operation(entity, {}))
+    for entity in "firm_fixed_multiply", "firm_fixed_divide":
+        for width in (16, 24, 32, 48):
+            sizes = {"WIDTH": width, "FRACTION": width // 2}
+            generics = {f"{port}_{name}": size for port in ("A", "B", "OUT") for name, size in sizes.items()}
+            yield Row(entity, width, _operation(entity, generics))
     for width in (16, 32, 64):
         yield Row("firm_integer_divide", width, _operation("firm_integer_divide", {"WIDTH": width}))
 

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
-from fusesoc_firm.compiler.kinds import KINDS
+from fusesoc_firm.compiler.kinds import kind_named
 from fusesoc_firm.compiler.operators import table_files
 from fusesoc_firm.compiler.program import Program, Task, compile_function
 from fusesoc_firm.compiler.schedule import Schedule
@@ -97,7 +97,7 @@ def program_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Progr
     """
     path = type_.accelerator.sources[0]
     text = (folder / path).read_text(encoding="utf-8", errors="replace")
-    floats = KINDS.get(numbers or str(type_.accelerator.numbers))
+    floats = kind_named(numbers or str(type_.accelerator.numbers))
     inputs = [side_of(side.prefix, side.frame) for side in type_.inputs]
     outputs = [
         side_of(side.prefix, side.frame, *([side.length.source.value] if side.length else [])) for side in type_.outputs

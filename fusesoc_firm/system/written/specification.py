@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.compiler.fixed import MOST_BITS, format_of
 from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.message.middleware import MIDDLEWARES
@@ -76,6 +77,7 @@ PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 NUMBERS = ("float32", "float64")
+"""The floats of an accelerator in Python; fixed-point numbers are another choice."""
 VHDL_93, VHDL_2008 = VHDL_STANDARDS = (93, 2008)
 # Whether the top level has a synchroniser after an input pin, a FIFO after a publisher, or time stamps.
 ADDED, NOT_ADDED = ADDITIONS = ("added", "none")
@@ -94,6 +96,14 @@ def source_fault(text: str) -> tuple[str, str] | None:
         return f"must be a file, not the folder '{text}'", "list its files: [rtl/one.vhd, rtl/two.vhd]"
     legal = "legal here: names of up to 200 letters, digits, '_', '.', '+' and '-', not starting with '-'"
     return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not accept as a file", legal)
+
+
+def numbers_fault(text: str) -> tuple[str, str] | None:
+    """Return the reason why `text` is not a type of an accelerator's numbers, or None if it is one."""
+    if text in NUMBERS or format_of(text):
+        return None
+    legal = f"legal here: float32, float64, fixed(W, F) with 2 to {MOST_BITS} bits, F of them as fraction, F < W"
+    return f"cannot be '{text}'", legal
 
 
 _FIELDS: dict[str, Any] = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
@@ -336,7 +346,7 @@ class Accelerator(Section):
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
     numbers: Text | None = key(
         "the type of the floating-point numbers of an accelerator in Python (default: the types of the fields)",
-        choices=NUMBERS,
+        rule=numbers_fault,
         is_asked=False,
     )
     resources: Resources | None = key(

@@ -20,6 +20,9 @@ package firm_number_pkg is
   function fitted(number : signed; bits : positive) return signed;
   function fitted(number : unsigned; bits : positive) return unsigned;
 
+  -- The nearest integer of a number of bits.
+  function saturated(number : signed; bits : positive) return signed;
+
   -- `one` if the condition is '1', else `other`.
   function chosen(condition : std_logic; one, other : std_logic_vector) return std_logic_vector;
   function chosen(condition, one, other : std_logic) return std_logic;
@@ -77,6 +80,19 @@ package body firm_number_pkg is
     wide := resize(number, number'length + bits);
     return wide(bits-1 downto 0);
   end function fitted;
+
+  function saturated(number : signed; bits : positive) return signed is
+    variable wide   : signed(number'length+bits-1 downto 0);
+    variable result : signed(bits-1 downto 0);
+  begin
+    wide   := resize(number, number'length + bits);
+    result := wide(bits-1 downto 0);
+    if resize(result, number'length + bits) /= wide then
+      result         := (others => not wide(wide'left));
+      result(bits-1) := wide(wide'left);
+    end if;
+    return result;
+  end function saturated;
 
   function chosen(condition : std_logic; one, other : std_logic_vector) return std_logic_vector is
   begin

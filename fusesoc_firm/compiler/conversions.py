@@ -1,0 +1,92 @@
+"""Numbers of one kind as numbers of another one, and the kind of a name that has several."""
+
+from __future__ import annotations
+
+from fusesoc_firm.compiler.graph import Graph, Node
+from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, number_of, result_kind
+
+
+class UnmergeableError(Exception):
+    """Two paths leave values that no hardware can hold in one place."""
+
+
+def converted(graph: Graph, value: Node, kind: Kind) -> Node:
+    """Return a number converted to another kind, as an operation with this kind converts its operands."""
+    if value.kind == kind:
+        return value
+    if value.is_constant:
+        return graph.constant(number_of(kind, value.payload))
+    if kind.is_float:
+        if value.kind.is_float:
+            return _resized(graph, value, kind)
+        return graph.node("to_float", (value,), kind)
+    if kind == BOOL:
+        raise UnmergeableError(f"a {value.kind} and a truth value")
+    if kind.format:
+        return _fixed(graph, value, kind)
+    limits = (value.low, value.high)
+    return graph.node("wrap", (value,), kind, limits=limits)
+
+
+def _resized(graph: Graph, value: Node, kind: Kind) -> Node:
+    """Return a float of another kind; Python's float has the bits of a float64."""
+    return graph.node("rename" if value.kind.bits == kind.bits else "resize", (value,), kind)
+
+
+def _fixed(graph: Graph, value: Node, kind: Kind) -> Node:
+    """Return a float or an integer as a fixed-point number."""
+    if value.kind.is_float:
+        return graph.node("to_integer", (value,), kind, "nearest")
+    return saturated(graph, shifted(graph, integer_of(graph, value), kind.fraction), kind)
+
+
+def integer_of(graph: Graph, value: Node) -> Node:
+    """Return an integer, a truth value or the units of a fixed-point number as an integer of Python."""
+    if value.is_constant:
+        return graph.constant(value.low)
+    if value.kind == INT:
+        return value
+    limits = (0, 1) if value.kind == BOOL else (value.low, value.high)
+    return graph.node("wrap", (value,), INT, limits=limits)
+
+
+def shifted(graph: Graph, value: Node, count: int) -> Node:
+    """Return an integer of Python times 2**count."""
+    if value.is_constant or not count:
+        return graph.constant(value.low << count) if value.is_constant else value
+    return graph.node("shift_left", (value,), INT, count, (value.low << count, value.high << count))
+
+
+def saturated(graph: Graph, units: Node, kind: Kind) -> Node:
+    """Return the fixed-point number with some units, or the nearest one."""
+    if units.is_constant:
+        assert kind.format
+        return graph.constant(kind.format.nearest(units.low))
+    least, most = kind.limits
+    limits = min(max(units.low, least), most), min(max(units.high, least), most)
+    operation = "wrap" if limits == (units.low, units.high) else "saturate"
+    return graph.node(operation, (units,), kind, limits=limits)
+
+
+def common_kind(one: Kind, other: Kind) -> Kind:
+    """Return the kind of a name that has one kind on one path, and another one on another path."""
+    if one == other:
+        return one
+    if BOOL in (one, other):
+        raise UnmergeableError(f"a {one} and a {other}")
+    return result_kind(lambda a, b: a + b, one, other)
+
+
+def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:
+    """Return the kind and limits of a number that is `first`, and is replaced by `after` again and again.
+
+    `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
+    """
+    kind = common_kind(first.kind, after.kind)
+    if kind.is_float:
+        return kind, 0, 0
+    if kind.format:
+        return kind, *kind.limits
+    limits = min(first.low, after.low), max(first.high, after.high)
+    # A number that grows beyond expectation may grow each time.
+    return (kind, *(kind.limits if known and limits != known[1:] else limits))
