@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
+from itertools import chain
 from operator import getitem
 from typing import Any, NoReturn
 
@@ -13,12 +15,14 @@ from fusesoc_firm.compiler.conversions import converted
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.interface import Elements, Leaf, Part, Side, places
-from fusesoc_firm.compiler.kinds import Kind
+from fusesoc_firm.compiler.kinds import INTEGERS, Kind, number_of
 from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.values import Array, Maybe, Produced, Record, Stream, Unbound, Value, described
-from fusesoc_firm.frame.model import Fixed, all_nodes, names_of
+from fusesoc_firm.frame.model import Fixed, Path, all_nodes, names_of
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
+
+_BYTE = 8
 
 
 @dataclass
@@ -30,11 +34,24 @@ class Made:
 
 
 @dataclass
+class Listed:
+    """A text or an array of an answer with a fixed number of elements: the fields of each one by port, as of `Made`."""
+
+    length: Node
+    elements: list[dict[str, list[Node]]]
+
+
+@dataclass
 class Sent:
-    """A string or an array of an answer: passed on from an input, made by a loop, or empty."""
+    """A string or an array of an answer: passed on from an input, made by a loop, listed, or empty."""
 
     part: Part | Elements
-    value: Stream | Made | None
+    value: Stream | Made | Listed | None
+
+    def listed(self) -> list[Node]:
+        """Return the numbers of all elements that are listed."""
+        elements = self.value.elements if isinstance(self.value, Listed) else []
+        return [node for fields in elements for nodes in fields.values() for node in nodes]
 
 
 @dataclass
@@ -45,6 +62,11 @@ class Answer:
     condition: Node
     fields: dict[str, list[Node]] = field(default_factory=dict)
     parts: list[Sent] = field(default_factory=list)
+
+    def nodes(self) -> Iterator[Node]:
+        """Yield all values that the answer needs, except for those that loops make."""
+        yield self.condition
+        yield from chain(*self.fields.values(), *(sent.listed() for sent in self.parts))
 
 
 @dataclass(frozen=True)
@@ -107,6 +129,7 @@ class AnswerMaker:
         found: dict[str, list[Node]] = {}
         graph = self.interpreter.graph
         for leaf in leaves:
+            self._check_lists(value, leaf.path, skipped)
             defaults = _defaults(side, leaf.path)
             for element, steps in enumerate(places(leaf.path)):
                 condition, given = self._at(value, steps[skipped:])
@@ -118,6 +141,20 @@ class AnswerMaker:
                 node = fallback if given is None else self._field(given, leaf.kind, steps)
                 found.setdefault(leaf.port, []).append(graph.choose(condition, node, fallback))
         return found
+
+    def _check_lists(self, value: Value, path: Path, skipped: int) -> None:
+        """Refuse a list that has not the elements of the array of fixed size in its place."""
+        for number, step in enumerate(path[skipped:], skipped + 1):
+            lists = {steps[:-1] for steps in places(path[:number])} if step.count is not None else ()
+            for steps in lists:
+                _, given = self._at(value, steps[skipped:])
+                count = len(given) if isinstance(given, tuple) else step.count
+                if isinstance(given, Array):
+                    count = len(self.interpreter.memory.cells[given])
+                if count != step.count:
+                    name = dotted(names_of(path[:number]))
+                    hint = f"return a list of {step.count}"
+                    self._refuse(f"'{name}' has {step.count} elements, and the list has {count}", hint)
 
     def _at(self, value: Value, steps: Sequence[str | int]) -> tuple[Node, Value]:
         """Return the value at a path of an answer, or None without one, and the condition that it is there."""
@@ -164,19 +201,48 @@ class AnswerMaker:
                     return Sent(part, Made(loop, self._element(side, part, element)))
             case None | "" if not is_fixed:
                 return Sent(part, None)
-            case Array() if not self.interpreter.memory.cells[given] and not is_fixed:
-                return Sent(part, None)
+            case Array() | tuple():
+                items = given if isinstance(given, tuple) else self.interpreter.memory.items(given)
+                return Sent(part, self._listed(side, part, items) if items else None)
+            case str() if isinstance(part, Part) and part.kind is None:
+                return Sent(part, self._text(part, given))
         return self._refuse(
             f"'{name}' is {described(given)}",
-            "pass one of the message on, or append to an empty list in a loop over an array",
+            "return a list, pass one of the message on, or append to an empty list in a loop over an array",
         )
+
+    def _listed(self, side: Side, part: Part | Elements, items: Sequence[Value]) -> Listed:
+        """Return an array whose elements are in a list."""
+        self._check_count(part, len(items))
+        if isinstance(part, Elements) and not part.leaves:
+            hint = "pass one of the message on, or leave it out"
+            self._refuse(f"'{dotted(names_of(part.path))}' is an array of texts, which lists do not make", hint)
+        length = self.interpreter.graph.constant(len(items))
+        return Listed(length, [self._element(side, part, item) for item in items])
+
+    def _text(self, part: Part, text: str) -> Listed:
+        """Return a text that is a constant."""
+        data = text.encode("utf-8" if part.bits == _BYTE else "utf-16-le")
+        units = struct.unpack(f"<{len(data) * _BYTE // part.bits}{'B' if part.bits == _BYTE else 'H'}", data)
+        self._check_count(part, len(units))
+        graph, kind = self.interpreter.graph, INTEGERS[f"uint{part.bits}"]
+        nodes = [graph.constant(number_of(kind, unit)) for unit in units]
+        return Listed(graph.constant(len(units)), [{part.stream: [node]} for node in nodes])
+
+    def _check_count(self, part: Part | Elements, count: int) -> None:
+        """Refuse a number of elements that the message does not have."""
+        fixed, name = _count(part), dotted(names_of(part.path))
+        if fixed is not None and count != fixed:
+            self._refuse(f"'{name}' has {fixed} elements, and the list has {count}", f"return a list of {fixed}")
+        if part.bound is not None and count > part.bound:
+            self._refuse(f"'{name}' has at most {part.bound} elements, and the answer has {count}", "return fewer")
 
     def _element(self, side: Side, part: Part | Elements, value: Value) -> dict[str, list[Node]]:
         """Return the fields of an element that a loop makes."""
         names = names_of(part.path)
         if isinstance(part, Part):
             if part.kind is None:
-                self._refuse(f"'{dotted(names)}' is a text, and the loop makes numbers", "pass a text on")
+                self._refuse(f"'{dotted(names)}' is a text, not an array", "return a text, or pass one on")
             return {part.stream: [self._field(value, part.kind, names)]}
         if isinstance(value, Record):
             self._check_names(reduce(getitem, names, side.frame.names), value, f"{dotted(names)}.")

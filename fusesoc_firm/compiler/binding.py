@@ -108,5 +108,4 @@ def uses(schedule: Schedule) -> Iterator[Use]:
         yield from (Use(node, phase, schedule.steps[phase] - 1) for node in chain(*made.fields.values()))
     yield from (Use(state.next, end, 0) for state in program.states)
     for answer in program.answers:
-        yield Use(answer.condition, end, 0)
-        yield from (Use(node, end, 0) for values in answer.fields.values() for node in values)
+        yield from (Use(node, end, 0) for node in answer.nodes())

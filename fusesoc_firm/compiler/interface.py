@@ -65,7 +65,7 @@ class Part:
     """A string or an array of variable size: its place in the message, and the prefix of its stream's ports.
 
     `length` is the port with the number of elements. `number` counts the parts of the message in wire order; the part
-    follows the segment of its length. The elements have no kind if they are characters.
+    follows the segment of its length. The elements have no kind if they are characters, and are at most `bound`.
     """
 
     path: Path
@@ -75,6 +75,7 @@ class Part:
     bits: int
     segment: int
     number: int
+    bound: int | None = None
 
     @property
     def element(self) -> str:
@@ -108,6 +109,7 @@ class Elements:
     ports: tuple[MessagePort, ...]
     segment: int
     number: int
+    bound: int | None = None
 
     @property
     def shape(self) -> tuple[object, ...]:
@@ -173,7 +175,7 @@ def _part(prefix: str, ports: StreamPorts, segment: int, number: int) -> Part:
     # A bool of an array is a byte.
     kind = KINDS["uint8" if data.element.name == "bool" else data.element.name] if data.kind is DataKind.ARRAY else None
     stream = f"{prefix}{ports.name}_axis"
-    return Part(data.path, stream, prefix + ports.length, kind, 8 * data.element.size, segment, number)
+    return Part(data.path, stream, prefix + ports.length, kind, 8 * data.element.size, segment, number, data.bound)
 
 
 def _elements(prefix: str, ports: ElementPorts, side: MessageSide, segment: int, number: int) -> Elements:
@@ -193,6 +195,7 @@ def _elements(prefix: str, ports: ElementPorts, side: MessageSide, segment: int,
         tuple(found),
         segment,
         number,
+        loop.bound,
     )
 
 

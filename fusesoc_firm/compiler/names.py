@@ -30,6 +30,10 @@ class Names(Paths):
     def expression(self, node: ast.expr) -> Value:
         """Return the value of an expression."""
 
+    @abstractmethod
+    def assign(self, target: ast.expr, value: Value) -> None:
+        """Assign a value to a name, an attribute, an element or several of them."""
+
     def global_value(self, name: str, node: ast.AST) -> Value:
         """Return the value of a name of the module, computed at its first use."""
         if name in self.module_names:
@@ -61,6 +65,10 @@ class Names(Paths):
             case ast.Assign(targets=[ast.Name()], value=given) | ast.AnnAssign(value=ast.expr() as given):
                 with self._own_frame():
                     return self.expression(given)
+            case ast.Assign(targets=[ast.Tuple() as target], value=given):
+                with self._own_frame() as frame:
+                    self.assign(target, self.expression(given))
+                    return frame.names[name]
         return self.refuse(definition, f"'{name}' is not a constant", "assign each name once, in a line of its own")
 
     def _builtin(self, name: str, node: ast.AST) -> Value:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -56,8 +57,7 @@ class Program:
         for made in self.made():
             yield from chain(*made.fields.values())
         for answer in self.answers:
-            yield answer.condition
-            yield from chain(*answer.fields.values())
+            yield from answer.nodes()
 
     def made(self) -> Iterator[Made]:
         """Yield the arrays that loops make."""
@@ -130,6 +130,12 @@ def compile_function(task: Task) -> Program:
         states |= wider
     source = task.source
     return source.refuse(source.module, "the types of the states cannot be determined", "give them a type of NumPy")
+
+
+def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
+    """Return the only expression that a function returns, or the function."""
+    found = [item.value for item in ast.walk(definition) if isinstance(item, ast.Return) and item.value]
+    return found[0] if len(found) == 1 else definition
 
 
 class _Run:
@@ -246,7 +252,7 @@ class _Run:
             )
             for path, leaf in self.leaves.items()
         ]
-        answers = AnswerMaker(self.interpreter, self.node, self.outputs).answers(self.result)
+        answers = AnswerMaker(self.interpreter, _returned(self.node), self.outputs).answers(self.result)
         for message, hint in problems(answers, self.interpreter.loops, self.inputs):
             self._refuse(message, hint)
         program = Program(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from fusesoc_firm.compiler.answers import Answer, Made, Sent
+from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.interface import Side
 from fusesoc_firm.compiler.paths import Loop
@@ -26,11 +26,15 @@ _EARLIER = (
 
 def source_of(sent: Sent) -> Stream | None:
     """Return the string or array of the message that a part of an answer passes on, or is made of."""
+    if isinstance(sent.value, Listed):
+        return None
     return sent.value.loop.stream if isinstance(sent.value, Made) else sent.value
 
 
 def length_of(sent: Sent) -> Node | None:
     """Return the number of elements of a part of an answer, or None if it is empty."""
+    if isinstance(sent.value, Listed):
+        return sent.value.length
     source = source_of(sent)
     return source.length if source else None
 
@@ -82,11 +86,22 @@ def _waits(answer: Answer) -> Iterator[tuple[str, str]]:
             yield f"{order}, but '{first.path}' follows '{second.path}' in the message", _ONE
     for name, segment, node, hint in _needs(answer):
         for sent, source in held:
-            # A value that follows from the elements of array n has the phase 2n + 2.
-            if sent.part.segment >= segment and node.phase >= 2 * source.number + 2:
+            if sent.part.segment >= segment and node.phase >= _after(source):
                 order = f"{name} precedes '{_name(sent)}' in the answer"
                 yield f"{order}, and depends on what follows '{source.path}' in the message", hint
                 break
+    for before in answer.parts:
+        phase = max((node.phase for node in before.listed()), default=0)
+        for sent, source in held:
+            if sent.part.number > before.part.number and phase >= _after(source):
+                order = f"'{_name(before)}' precedes '{_name(sent)}' in the answer"
+                yield f"{order}, and depends on what follows '{source.path}' in the message", _EARLIER
+                break
+
+
+def _after(source: Stream) -> int:
+    """Return the phase of values that follow from the elements of an array."""
+    return 2 * source.number + 2
 
 
 def _needs(answer: Answer) -> Iterator[tuple[str, int, Node, str]]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fusesoc_firm.compiler.answers import Answer, Made, Sent
+from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
 from fusesoc_firm.compiler.binding import Binding, Register
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.interface import Elements, Part
@@ -28,6 +28,8 @@ _SIGNALS = """
     step_r at_step_r advance holds is_open is_checked accepted done sent_r
     firm rtl work ieee operations control clk rst_n
 """.split()
+# The signals of a list whose elements have the name '*'.
+_OF_LIST = ("words_*", "word_*", "index_*_r", "ends_*", "valid_*", "ready_*", "sent_*_r")
 _INTEGER_OPERATORS = {"add": "+", "subtract": "-"}
 _LONGEST_COMMENT = 90
 
@@ -70,6 +72,7 @@ class Writer:
         answers = [_own_signal(name, answer) for answer in self.program.answers for name in ("dropped", "segments")]
         sides = [*self.program.inputs, *(answer.side for answer in self.program.answers)]
         elements = [part.element for side in sides for part in side.parts]
+        elements += [name.replace("*", element) for element in elements for name in _OF_LIST]
         reserved = [*_SIGNALS, *KEYWORDS, *VHDL_PREDEFINED, *ports, *answers, *elements]
         names = distinct_identifiers([_words(name) for _, name in wanted], reserved)
         self._names = {key: name for (key, _), name in zip(wanted, names, strict=True)}
@@ -408,6 +411,9 @@ class Writer:
                 for sent in answer.parts
                 if isinstance(sent.part, Part) and isinstance(sent.value, Made)
             ],
+            "listed": [
+                self._listed(answer, number, sent.part, sent) for sent in answer.parts if isinstance(sent.value, Listed)
+            ],
         }
 
     def _drop(self, answer: Answer) -> Context:
@@ -434,6 +440,8 @@ class Writer:
                 yield from _passed(sent.value.part, sent.part, dropped)
             elif sent.value is None:
                 yield from _empty(_ports_of(sent.part))
+            elif isinstance(sent.value, Listed):
+                yield from _listed_message(sent.part, sent.value) if isinstance(sent.part, Elements) else ()
             elif isinstance(sent.part, Elements):
                 yield from self._made_message(sent.part, sent.value)
 
@@ -507,6 +515,32 @@ class Writer:
             "last": f"{element}_last",
         }
 
+    def _listed(self, answer: Answer, number: int, part: Part | Elements, sent: Sent) -> Context:
+        """Return the array or text that consists of listed elements."""
+        assert isinstance(sent.value, Listed)
+        end, elements = len(self.schedule.steps), sent.value.elements
+        # The first port of an element, and the first element, are in the lowest bits.
+        words = [" & ".join(self._field(nodes, end, 0) for nodes in reversed(item.values())) for item in elements]
+        conditions = ["is_open", f"not sent_r({number})", f"not sent_{part.element}_r"]
+        if not is_streamed(answer):
+            conditions.append("done")
+        for node in sent.listed():
+            conditions += self._valid(node)
+        if _is_conditional(answer):
+            conditions += [*self._valid(answer.condition), self._at_end(answer.condition)]
+        return {
+            "element": part.element,
+            "count": len(elements),
+            "last": len(elements) - 1,
+            "bits": _word_bits(elements[0]),
+            "all_bits": len(elements) * _word_bits(elements[0]),
+            "words": " & ".join(f"({word})" if " & " in word else word for word in reversed(words)),
+            "conditions": [*dict.fromkeys(conditions)],
+            "index_bits": max(1, (len(elements) - 1).bit_length()),
+            "stream": [_stream(part)] if isinstance(part, Part) else [],
+            "ready": f"{part.element}_ready" if isinstance(part, Elements) else "",
+        }
+
     def _input(self, part: Part | Elements) -> Context:
         loop = next((item for item in self.program.loops if item.number == part.number), None)
         passed = any(
@@ -528,6 +562,29 @@ class Writer:
             "step": self.bases[2 * part.number + 2] - 1 if loop else 0,
             "numbers": numbers,
         }
+
+
+def _stream(part: Part) -> Context:
+    return {"name": part.stream, "element": part.element, "bits": part.bits, "keep": "1" * (part.bits // 8)}
+
+
+def _word_bits(element: Mapping[str, Sequence[Node]]) -> int:
+    return sum(node.bits for nodes in element.values() for node in nodes)
+
+
+def _listed_message(part: Elements, listed: Listed) -> Iterator[tuple[str, str]]:
+    """Yield the ports of an element of a list."""
+    low = 0
+    for port, nodes in listed.elements[0].items():
+        bits = sum(node.bits for node in nodes)
+        is_bit = len(nodes) == 1 and nodes[0].kind == BOOL
+        yield port, f"word_{part.element}({low})" if is_bit else f"word_{part.element}({low + bits - 1} downto {low})"
+        low += bits
+    yield from _empty(part.inner)
+    valid = f"valid_{part.element}"
+    own = {"valid": valid, "last": f"ends_{part.element}", "segment_valid": f"(others => {valid})"}
+    names = {item.name for item in part.ports}
+    yield from ((name, text) for signal, text in own.items() if (name := f"{part.element}_{signal}") in names)
 
 
 def _is_conditional(answer: Answer) -> bool:

@@ -57,7 +57,8 @@ _HANDSHAKE = ("segment_valid", "msg_valid", "msg_ready")
 
 
 def message_frame(text: str = MESSAGE) -> Frame:
-    return frame_of(parse_name("test_msgs/Numbers"), parsed({"test_msgs/Numbers": text}, ROS2))
+    texts = {"test_msgs/Numbers": text, "test_msgs/Place": "float32 x\nfloat32 y\n"}
+    return frame_of(parse_name("test_msgs/Numbers"), parsed(texts, ROS2))
 
 
 FRAME = message_frame()

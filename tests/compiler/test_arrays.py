@@ -18,6 +18,7 @@ _MESSAGES = {
     "Point": "float32 x\nfloat32 y\nfloat64[2] more\n",
     "Named": "string name\nint16 weight\nPoint place\nuint8[] bytes\n",
     "Cloud": "int32 first\nstring frame\nPoint[] points\nuint8[] colors\nNamed[] named\nPoint[3] corners\nint32 tail\n",
+    "Track": "string frame\nPoint[] points\nuint8[] colors\nPoint[3] corners\nint32 first\n",
     "Summary": "float32 nearest\nuint32 count\nint64 total\n",
     "Points": "Point[] points\nint32 tail\nbool segments\nuint8 element_out_points\n",
 }
@@ -68,6 +69,40 @@ def coloured(m):
 """,
     ),
     "same": ("Cloud", "length: given", "def same(m):\n    return {**m, 'tail': m.tail * 3, 'first': len(m.frame)}\n"),
+    "listed": (
+        "Track",
+        "length: computed",
+        """
+class Listed:
+    def __init__(self):
+        self.past = [0] * 5
+
+    def __call__(self, m):
+        self.past = [m.tail % 256, *self.past[:4]]
+        if m.first == 1:
+            return None
+        corners = [{"x": c.y * 2.0, "y": c.x} for c in m.corners]
+        return {
+            "frame": "map \\u00e4", "points": (m.corners[0], {"more": [c.x for c in m.corners[:2]]}),
+            "colors": self.past, "corners": corners, "first": m.first * 3,
+        }
+
+
+listed = Listed()
+""",
+    ),
+    "sums": (
+        "Cloud",
+        "length: buffered",
+        """
+def sums(m):
+    low = high = 0.0
+    for p in m.points:
+        low, high = min(low, p.x), max(high, p.y)
+    named = [{"weight": len(m.points), "place": {"x": low}}, {"place": m.corners[1]}]
+    return {"frame": m.frame, "points": [{"x": low, "y": high}], "colors": m.colors, "named": named, "tail": m.tail}
+""",
+    ),
     "partly": (
         "Cloud",
         "length: buffered",

@@ -14,7 +14,10 @@ from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import message_frame
 
 SCAN = message_frame("float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n")
-ANSWER = message_frame("float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nfloat32[] more\nstring name\n")
+ANSWER = message_frame(
+    "float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nfloat32[] more\nstring name\nuint8[<=2] few\nstring<=3 short\n"
+    "string[] names\nPlace[2] corners\n"
+)
 _LOOP = "made = []\ntotal = 0.0\nfor r in m.ranges:\n    made.append(r)\n    total = total + r\n"
 
 # The body of a function of the message `m`, with '@' before the place of the fault; the message, and the remedy.
@@ -81,8 +84,19 @@ RETURNS = [
     ("return @1", "the function returns a int, not a message", "'field'"),
     ("return {'y': 1}", "the answer has no field 'y'", ""),
     ("return {'i': m.low}", "'i' is an integer \\(int32\\), and the answer is a float32", "round\\(\\)"),
-    ("return {'ranges': [m.low]}", "'ranges' is a list", "append"),
-    ("return {'name': 'a'}", "'name' is a text", "pass one"),
+    ("return {'ranges': m.low}", "'ranges' is a float32", "append"),
+    ("return {'ranges': 'a'}", "'ranges' is a text", "a list"),
+    ("return {'name': [1]}", "'name' is a text, not an array", "a text"),
+    ("return {'few': [1, 2, 3]}", "'few' has at most 2 elements, and the answer has 3", "fewer"),
+    ("return {'short': 'abcd'}", "'short' has at most 3 elements, and the answer has 4", "fewer"),
+    ("return {'names': ['a']}", "'names' is an array of texts", "leave it out"),
+    ("return {'corners': [{'x': 1.0}]}", "'corners' has 2 elements, and the list has 1", "a list of 2"),
+    ("return {'ranges': [1.0] if m.p else [1.0, 2.0]}", "a list and another one with another number", ""),
+    (
+        _LOOP + "for h in m.heights:\n    total = total + h\nreturn {'ranges': [total], 'more': made}",
+        "'ranges' precedes 'more' in the answer, and depends on what follows 'ranges'",
+        "comes earlier",
+    ),
     ("return {'ranges': m.name}", "'ranges' is an array of variable size", "append"),
     ("return {'ranges': m.ranges, 'more': m.ranges}", "'ranges' is sent twice", "one place"),
     ("return {'ranges': m.heights, 'more': m.ranges}", "'ranges' precedes 'more' in the answer", "one of both"),

@@ -17,6 +17,7 @@ from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in
 from fusesoc_firm.system.derived.actions import actions_of
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.entities import check_entities
+from fusesoc_firm.system.derived.held import check_held
 from fusesoc_firm.system.derived.lateness import with_lateness_buffers
 from fusesoc_firm.system.derived.length import publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
@@ -89,6 +90,7 @@ def derive(
         actions=flow.actions,
     )
     check_entities(system, parts.blocks, faults)
+    check_held(system, parts.blocks, faults)
     faults.raise_if_any()
     return with_lateness_buffers(system, project, faults)
 

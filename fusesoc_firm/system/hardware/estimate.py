@@ -94,8 +94,10 @@ def _multipliers(node: Node) -> int:
 
 
 def _selections(schedule: Schedule) -> float:
-    """Return the LUT4 that choose the operands of operators."""
-    return sum(_SOURCE * unit.operator.operand * (count - 1) for unit, count in _choices(schedule) if count > 1)
+    """Return the LUT4 that choose the operands of operators, and the elements of lists."""
+    found = sum(_SOURCE * unit.operator.operand * (count - 1) for unit, count in _choices(schedule) if count > 1)
+    listed = (node for answer in schedule.program.answers for sent in answer.parts for node in sent.listed())
+    return found + sum(_SOURCE * node.bits for node in listed if not node.is_constant)
 
 
 def _choices(schedule: Schedule) -> Iterator[tuple[Unit, int]]:
