@@ -422,7 +422,7 @@ class Arithmetic:
         operands = [self.real(value) for value in values]
         kind = operands[0].kind
         for item in operands[1:]:
-            kind = common_kind(kind, item.kind)
+            kind = result_kind(operator.add, kind, item.kind)
         operands = [self._to(item, kind) for item in operands]
         if all(item.is_constant for item in operands):
             return self.graph.constant(number_of(kind, modelled(name, kind, *(item.payload for item in operands))))

@@ -38,6 +38,13 @@ class Binding:
     schedule: Schedule
     registers: list[Register] = field(default_factory=list)
     by_node: dict[int, Register] = field(default_factory=dict)
+    # The values of pipelines that are read in later stages, each with the last one.
+    delayed: dict[int, tuple[Node, int]] = field(default_factory=dict)
+
+    def delays(self) -> Iterator[tuple[Node, int]]:
+        """Yield each value that a pipeline hands on from one stage to the next, with the number of the latter."""
+        for node, last in self.delayed.values():
+            yield from ((node, stage) for stage in range(self.schedule.stage(node) + 1, last + 1))
 
 
 def bound(schedule: Schedule) -> Binding:
@@ -48,15 +55,19 @@ def bound(schedule: Schedule) -> Binding:
     """
     last: dict[int, tuple[Node, int]] = {}
     bases = schedule.bases
+    binding = Binding(schedule)
     for use in uses(schedule):
+        if use.phase in schedule.depths:
+            _delay(binding, use)
         for node in sources(use.node):
             time = schedule.times[node.number]
+            if time.phase == use.phase and use.phase in schedule.depths:
+                continue
             if time.phase == use.phase and time.step == use.step:
                 continue
             # Values for later phases, and for all elements of a loop, keep their register.
             end = bases[use.phase] + use.step if time.phase == use.phase and use.phase % 2 == 0 else _FOR_EVER
             last[node.number] = node, max(end, last.get(node.number, (node, 0))[1])
-    binding = Binding(schedule)
     shared: dict[object, list[Register]] = {}
     for node, end in sorted(last.values(), key=lambda item: _appears(schedule, item[0])):
         begin = _appears(schedule, node)
@@ -73,6 +84,14 @@ def bound(schedule: Schedule) -> Binding:
     return binding
 
 
+def _delay(binding: Binding, use: Use) -> None:
+    """Note the stage in which a pipeline reads a value of its own."""
+    for node in _read(use.node):
+        if node.phase == use.phase:
+            before = binding.delayed.get(node.number, (node, 0))[1]
+            binding.delayed[node.number] = node, max(before, use.step)
+
+
 def _appears(schedule: Schedule, node: Node) -> int:
     time = schedule.times[node.number]
     return schedule.bases[time.phase] + time.step
@@ -80,10 +99,15 @@ def _appears(schedule: Schedule, node: Node) -> int:
 
 def sources(node: Node) -> Iterator[Node]:
     """Yield the values that are read to evaluate a value: itself, unless it is a leaf or wires of other values."""
+    yield from (item for item in _read(node) if item.operation not in LEAVES)
+
+
+def _read(node: Node) -> Iterator[Node]:
+    """Yield the values that are read to evaluate a value, and leaves."""
     if node.operation in TRANSPARENT:
         for item in node.operands:
-            yield from sources(item)
-    elif node.operation not in LEAVES:
+            yield from _read(item)
+    else:
         yield node
 
 
@@ -102,10 +126,10 @@ def uses(schedule: Schedule) -> Iterator[Use]:
         for item in loop.carried.values():
             yield Use(item.first, phase - 1, schedule.steps[phase - 1] - 1)
             if item.next is not None:
-                yield Use(item.next, phase, schedule.steps[phase] - 1)
+                yield Use(item.next, phase, schedule.carried.get(item.value.number, schedule.steps[phase] - 1))
     for made in program.made():
         phase = 2 * made.loop.number + 1
-        yield from (Use(node, phase, schedule.steps[phase] - 1) for node in chain(*made.fields.values()))
+        yield from (Use(node, phase, schedule.end(phase)) for node in chain(*made.fields.values()))
     yield from (Use(state.next, end, 0) for state in program.states)
     for answer in program.answers:
         yield from (Use(node, end, 0) for node in answer.nodes())

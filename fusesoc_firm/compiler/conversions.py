@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, number_of, result_kind
 
@@ -69,12 +71,22 @@ def saturated(graph: Graph, units: Node, kind: Kind) -> Node:
 
 
 def common_kind(one: Kind, other: Kind) -> Kind:
-    """Return the kind of a name that has one kind on one path, and another one on another path."""
+    """Return the kind of a name that has one kind on one path, and another one on another path.
+
+    Raise `UnmergeableError` for two types of NumPy: operations on the name would have the type of its path in Python.
+    """
+    if one != other and not (one.is_weak or other.is_weak):
+        raise UnmergeableError(f"a {one} and a {other}")
+    return kind_of_both(one, other)
+
+
+def kind_of_both(one: Kind, other: Kind) -> Kind:
+    """Return the kind that holds the numbers of two kinds, as that of an operation on both."""
     if one == other:
         return one
     if BOOL in (one, other):
         raise UnmergeableError(f"a {one} and a {other}")
-    return result_kind(lambda a, b: a + b, one, other)
+    return result_kind(operator.add, one, other)
 
 
 def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:

@@ -54,10 +54,11 @@ class Carried:
 
 @dataclass
 class Loop:
-    """A loop over a stream: the carried values, and the lists to which it appends."""
+    """A loop over a stream, at a node of the source: the carried values, and the lists to which it appends."""
 
     number: int
     stream: Stream
+    node: ast.AST
     carried: dict[Any, Carried] = field(default_factory=dict)
     appended: dict[Array, Value] = field(default_factory=dict)
 

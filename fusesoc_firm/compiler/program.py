@@ -16,7 +16,7 @@ from fusesoc_firm.compiler.interface import Side, message_value
 from fusesoc_firm.compiler.kinds import Kind, number_of
 from fusesoc_firm.compiler.paths import Carried, Loop
 from fusesoc_firm.compiler.source import Source
-from fusesoc_firm.compiler.streaming import problems
+from fusesoc_firm.compiler.streaming import late, problems
 from fusesoc_firm.compiler.values import Array, Class, Function, Instance, Named, Record, Value, described
 from fusesoc_firm.text.diagnostics import nearest
 
@@ -265,4 +265,7 @@ class _Run:
             answers,
         )
         program.drop_unused()
+        for loop, name in late(program.loops, answers):
+            message = f"the loop over '{loop.stream.path}' needs '{name}', which follows it in the message"
+            self.interpreter.refuse(loop.node, message, "take an earlier field, or keep the value of the last message")
         return program

@@ -134,7 +134,7 @@ class Repetition(Calls):
         names, memory = dict(self.names), self.memory
         carried: dict[Any, Carried] = {}
         for _ in range(_MOST_ROUNDS):
-            loop = Loop(stream.number, stream, dict(carried))
+            loop = Loop(stream.number, stream, node, dict(carried))
             self.names, self.memory = dict(names), memory.copy()
             self.is_alive = True
             self._enter(carried)

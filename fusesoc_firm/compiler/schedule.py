@@ -3,16 +3,22 @@
 Each phase has its own steps. An operator takes its operands at the end of a step, into registers, and its result can
 be read from one step on. All other operations are combinational: they are evaluated in the step in which their operands
 can be read, if the delay since a register remains below a budget.
+
+The elements of a stream are computed one after the other, or as a pipeline if each operation of the loop has a unit of
+its own and no value is needed earlier than it is known: an element enters with each cycle, and steps are its stages.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.kinds import BOOL
 from fusesoc_firm.compiler.operators import SHORT, Operator, is_operator, operator_of
+from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.program import Program
 
 # Operations that are part of the reader's expression: wires, or one inverter a bit.
@@ -20,6 +26,9 @@ _OF_FLOATS = ("negate", "absolute", "copy_sign", "rename", "sine", "cosine")
 TRANSPARENT = (*_OF_FLOATS, "quotient", "remainder", "wrap", "shift_left", "shift_right", "invert")
 # Delays in tenths of a nanosecond in an ECP5-8, and the most that lie between two registers.
 _BUDGET = 60
+_FOR_EVER = 1 << 30
+RELEASE = 2
+"""The cycles in which an answer is taken and the message released."""
 _SELECTION = 15
 _LOGIC, _CHOICE, _EQUALITY, _CARRY, _PER_BIT = 3, 8, 20, 20, 0.35
 
@@ -53,10 +62,16 @@ class Issue:
 
 @dataclass
 class Schedule:
-    """The times of all values; `steps` is the number of steps of each phase."""
+    """The times of all values; `steps` is the number of steps of each phase.
+
+    A phase in `depths` is a pipeline, which takes one step: the number of its last stage, counted from 0. A value that
+    it carries from one element to the next is replaced in the stage `carried`.
+    """
 
     program: Program
     steps: list[int]
+    depths: dict[int, int] = field(default_factory=dict)
+    carried: dict[int, int] = field(default_factory=dict)
     times: dict[int, Time] = field(default_factory=dict)
     issues: dict[int, Issue] = field(default_factory=dict)
     units: list[Unit] = field(default_factory=list)
@@ -69,15 +84,32 @@ class Schedule:
     @property
     def interval(self) -> int:
         """The cycles between two messages: the answer is taken, and the message released, in two more cycles."""
-        return self.latency + 2
+        return self.latency + RELEASE
+
+    @property
+    def element(self) -> int:
+        """The most cycles for an element of an array."""
+        return max(self.steps[1::2], default=0)
 
     @property
     def bases(self) -> list[int]:
         """The first step of each phase, counted from the begin of the program, and the step after the last one."""
-        found = [0]
-        for count in self.steps:
-            found.append(found[-1] + count)
-        return found
+        return [0, *accumulate(self.steps)]
+
+    @property
+    def starts(self) -> list[int]:
+        """The first cycle of each phase with one element of each array, and the cycle after the last one."""
+        return [0, *accumulate(self.depths.get(phase, count - 1) + 1 for phase, count in enumerate(self.steps))]
+
+    def end(self, phase: int) -> int:
+        """Return the last step of a phase, or the last stage of a pipeline."""
+        return self.depths.get(phase, self.steps[phase] - 1)
+
+    def stage(self, node: Node) -> int:
+        """Return the first stage of its pipeline in which a value can be read."""
+        if node.operation in LEAVES:
+            return self.carried.get(node.number, 0)
+        return self.times[node.number].step
 
 
 def scheduled(program: Program, limits: Mapping[str, int] | None = None, form: str = SHORT) -> Schedule:
@@ -98,6 +130,7 @@ class _Builder:
         self.schedule, self.limits, self.form = schedule, limits, form
         self.free: dict[Unit, int] = {}
         self.waits: list[int] = []
+        self.is_pipeline = False
         self.loops = {2 * loop.number + 1: loop for loop in schedule.program.loops}
         # Of the phase that is scheduled: the users of each value, the operands that each lacks, and what can start.
         self.phase = 0
@@ -107,6 +140,52 @@ class _Builder:
 
     def run(self, phase: int, nodes: Sequence[Node]) -> None:
         """Schedule the operations of a phase, which are in the order of their operands."""
+        loop = self.loops.get(phase)
+        if loop is None or not self._is_pipeline(loop, nodes):
+            self._sequence(phase, nodes)
+            self.schedule.steps[phase] = self._length(phase, nodes)
+
+    def _is_pipeline(self, loop: Loop, nodes: Sequence[Node]) -> bool:
+        """Schedule the operations of a loop as a pipeline; return whether it is one."""
+        operators = Counter(operator_of(node, self.form) for node in nodes if is_operator(node))
+        for operator, count in operators.items():
+            if operator.has_wait or count > self.limits.get(operator.operation, 1):
+                return False
+        phase, units = 2 * loop.number + 1, len(self.schedule.units)
+        stages = dict.fromkeys((item.value.number for item in loop.carried.values()), 0)
+        self.is_pipeline = True
+        for _ in range(len(stages) + 2):
+            self.schedule.carried |= stages
+            self._sequence(phase, nodes)
+            before, stages = stages, self._replaced(loop)
+            if before == stages:
+                break
+        self.is_pipeline = False
+        depth = max([*(self.time(node).step for node in nodes), *stages.values()], default=0)
+        if before == stages and depth:
+            self.schedule.depths[phase], self.schedule.steps[phase] = depth, 1
+            return True
+        del self.schedule.units[units:]
+        for node in nodes:
+            self.schedule.issues.pop(node.number, None)
+        self.schedule.carried = {
+            number: stage for number, stage in self.schedule.carried.items() if number not in stages
+        }
+        return False
+
+    def _replaced(self, loop: Loop) -> dict[int, int]:
+        """Return the stage in which each value that a pipeline carries is replaced: not before the new one is known.
+
+        It is not read in an earlier stage, where that of an earlier element would still be there.
+        """
+        return {
+            item.value.number: max(self.schedule.carried[item.value.number], self.time(item.next).step)
+            for item in loop.carried.values()
+            if item.next is not None
+        }
+
+    def _sequence(self, phase: int, nodes: Sequence[Node]) -> None:
+        """Set the times of the operations of a phase, as early as units are free."""
         self.phase, self.waits, self.ready = phase, [], []
         self.free = dict.fromkeys(self.schedule.units, 0)
         own = {node.number for node in nodes}
@@ -127,7 +206,6 @@ class _Builder:
                     self.ready.remove(node)
                     left -= 1
             step += 1
-        self.schedule.steps[phase] = self._length(phase, nodes)
 
     def _enter(self, node: Node) -> None:
         """Note that all operands of a value have times: an operator can start, and all else is evaluated."""
@@ -172,7 +250,7 @@ class _Builder:
         unit = self._free_unit(operator, step)
         if unit is None:
             return False
-        self.free[unit] = end if operator.has_wait else step + 1
+        self.free[unit] = _FOR_EVER if self.is_pipeline else end if operator.has_wait else step + 1
         if operator.has_wait:
             self.waits.append(end)
         self.schedule.issues[node.number] = Issue(node, unit, step, end)
@@ -195,7 +273,7 @@ class _Builder:
     def time(self, node: Node) -> Time:
         """Return when a value can be read in the phase that is scheduled."""
         if node.operation in LEAVES or node.phase < self.phase:
-            return Time(self.phase, 0)
+            return Time(self.phase, self.schedule.carried.get(node.number, 0) if node.phase == self.phase else 0)
         return self.schedule.times[node.number]
 
     def _evaluated(self, node: Node) -> Time:

@@ -6,8 +6,9 @@ answer is sent. So nothing that precedes it may depend on what comes after the s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
 from fusesoc_firm.compiler.graph import Node
@@ -65,6 +66,29 @@ def problems(answers: Sequence[Answer], loops: Sequence[Loop], inputs: Sequence[
         if answer.side.length == "given":
             yield from _lengths(answer, inputs)
         yield from _waits(answer)
+
+
+def late(loops: Sequence[Loop], answers: Sequence[Answer]) -> Iterator[tuple[Loop, str]]:
+    """Yield each loop that needs a value that follows its array in the message, with the value's name."""
+    made = [sent.value for answer in answers for sent in answer.parts if isinstance(sent.value, Made)]
+    for loop in loops:
+        phase = 2 * loop.number + 1
+        needed = [(item.first, phase - 1) for item in loop.carried.values()]
+        needed += [(item.next, phase) for item in loop.carried.values() if item.next is not None]
+        needed += [(node, phase) for item in made if item.loop is loop for node in chain(*item.fields.values())]
+        for node, last in needed:
+            if node.phase > last:
+                yield loop, _late_name(node)
+                break
+
+
+def _late_name(node: Node) -> str:
+    """Return the name of the field, or of the result of a loop, for which a value waits."""
+    while node.operands:
+        node = max(node.operands, key=lambda item: item.phase)
+    if node.operation == "final":
+        return str(node.payload[1][1])
+    return re.sub(r"^in\d*_", "", node.payload.port)
 
 
 def _lengths(answer: Answer, inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:

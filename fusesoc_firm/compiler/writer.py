@@ -30,6 +30,9 @@ _SIGNALS = """
 """.split()
 # The signals of a list whose elements have the name '*'.
 _OF_LIST = ("words_*", "word_*", "index_*_r", "ends_*", "valid_*", "ready_*", "sent_*_r")
+# The signals of a pipeline: no output stalls it, an element enters, is in each stage, and is the last one; the last one
+# has entered, and leaves.
+_OF_PIPELINE = ("flow", "enters", "token", "last", "all", "ends")
 _INTEGER_OPERATORS = {"add": "+", "subtract": "-"}
 _LONGEST_COMMENT = 90
 
@@ -67,6 +70,10 @@ class Writer:
                 wanted.append((node.number, node.name or f"{node.operation}_{node.number}"))
         for unit in self.schedule.units:
             wanted.append((unit, f"{unit.operator.operation}_{unit.operator.operand}_{unit.number}"))
+        for node, stage in self.binding.delays():
+            wanted.append((("delayed", node.number, stage), f"{self._value_name(node)}_{stage}_r"))
+        for phase in self.schedule.depths:
+            wanted += [((name, phase), f"{name}_{phase // 2}") for name in _OF_PIPELINE]
         ports = [leaf.port for answer in self.program.answers for leaf in answer.side.leaves]
         ports += [leaf.port for side in self.program.inputs for leaf in side.leaves]
         answers = [_own_signal(name, answer) for answer in self.program.answers for name in ("dropped", "segments")]
@@ -84,6 +91,12 @@ class Writer:
             return first.name or f"{first.operation}_{first.number}"
         return f"{issue.unit.operator.operation}_value"
 
+    def _value_name(self, node: Node) -> str:
+        """Return the name of a value that a pipeline hands on."""
+        if node.operation == "input":
+            return str(node.payload.port)
+        return str(node.payload[1]) if node.operation == "carried" else node.name or f"{node.operation}_{node.number}"
+
     def _has_signal(self, node: Node) -> bool:
         return node.operation not in LEAVES and node.operation not in TRANSPARENT and not is_operator(node)
 
@@ -91,6 +104,8 @@ class Writer:
 
     def value(self, node: Node, phase: int, step: int) -> str:
         """Return the expression of a value in a step of a phase."""
+        if phase in self.schedule.depths and (key := ("delayed", node.number, step)) in self._names:
+            return self._names[key]
         match node.operation:
             case "constant":
                 return self._constant(node)
@@ -219,6 +234,9 @@ class Writer:
             ),
             "holds": self._holds(),
             "jumps": self._jumps(),
+            "pipelines": [
+                self._pipeline(loop) for loop in self.program.loops if 2 * loop.number + 1 in self.schedule.depths
+            ],
             "units": [self._unit(unit) for unit in self.schedule.units],
             "combinational": signals,
             "loads": loads,
@@ -269,6 +287,9 @@ class Writer:
         for unit in self.schedule.units:
             ports = self._operand_names(unit)
             found += [{"name": name, "type": vhdl_type(unit.operator.operand)} for name in ports]
+        for node, stage in self.binding.delays():
+            name = self._names["delayed", node.number, stage]
+            found.append({"name": name, "type": _type(node.bits, node.kind == BOOL)})
         return found
 
     def _operand_names(self, unit: Unit) -> list[str]:
@@ -293,8 +314,45 @@ class Writer:
             "has_wait": operator.has_wait,
             "is_pipeline": not operator.has_wait,
             "taken": " or ".join(f"step_r = {step}" for step in sorted(steps)),
+            "flow": " and ".join(self._names["flow", phase] for phase in self._pipelines_of(unit)) or "'1'",
             "starts": " or ".join(f"step_r = {self.bases[item.node.phase] + item.start}" for item in issues),
         }
+
+    def _pipelines_of(self, unit: Unit) -> list[int]:
+        """Return the pipelines that a unit is part of."""
+        phases = {item.node.phase for item in self.schedule.issues.values() if item.unit == unit}
+        return sorted(phases & self.schedule.depths.keys())
+
+    def _pipeline(self, loop: Loop) -> Context:
+        """Return the stages of a loop that takes an element in each cycle."""
+        phase = 2 * loop.number + 1
+        step, depth = self.bases[phase], self.schedule.depths[phase]
+        names = {name: self._names[name, phase] for name in _OF_PIPELINE}
+        held = [f"{names['token']}({depth}) and not {ready}" for ready in self._readies(loop)]
+        lines: list[tuple[str, str, Node | None]] = []
+        for item in self.schedule.issues.values():
+            if item.node.phase == phase:
+                lines += self._operands(item)
+        for node, stage in self.binding.delays():
+            if node.phase == phase:
+                lines.append((self._names["delayed", node.number, stage], self.value(node, phase, stage - 1), None))
+        carried = []
+        for value in loop.carried.values():
+            if value.next is not None and value.next is not value.value:
+                stage = self.schedule.carried[value.value.number]
+                text = self.fitted(value.next, value.value.bits, phase, stage)
+                token = f"{names['token']}({stage})" if stage else names["enters"]
+                name = self._names["carried", loop.number, value.value.payload]
+                carried.append({"name": name, "value": text, "token": token})
+        element = loop.stream.part.element
+        return {**names, "step": step, "depth": depth, "element": element, "stalls": " or ".join(held) or "'0'",
+                "path": loop.stream.path, "lines": _commented(lines), "carried": carried}  # fmt: skip
+
+    def _readies(self, loop: Loop) -> Iterator[str]:
+        """Yield the conditions that the elements that a loop makes are taken."""
+        for answer, sent in self._sent_of(loop):
+            ready = f"{sent.part.element}_ready"
+            yield f"({ready} or {_dropped(answer)})" if _may_be_dropped(answer) else ready
 
     def _holds(self) -> list[Context]:
         """Return the steps that wait, each with the condition that ends the wait."""
@@ -304,10 +362,11 @@ class Writer:
                 found.setdefault(self.bases[phase], []).append(self._segment(phase // 2))
         for loop in self.program.loops:
             phase = 2 * loop.number + 1
+            if phase in self.schedule.depths:
+                found.setdefault(self.bases[phase], []).append(self._names["ends", phase])
+                continue
             found.setdefault(self.bases[phase], []).append(f"{loop.stream.part.element}_valid")
-            for answer, sent in self._sent_of(loop):
-                ready = f"{sent.part.element}_ready"
-                condition = f"({ready} or {_dropped(answer)})" if _may_be_dropped(answer) else ready
+            for condition in self._readies(loop):
                 found.setdefault(self.bases[phase + 1] - 1, []).append(condition)
         for item in self.schedule.issues.values():
             if item.unit.operator.has_wait:
@@ -332,7 +391,8 @@ class Writer:
             first, after = self.bases[phase], self.bases[phase + 1]
             if part.length:
                 found.append({"step": first - 1, "condition": f"unsigned({part.length}) = 0", "target": after})
-            found.append({"step": after - 1, "condition": f"{part.element}_last = '0'", "target": first})
+            if phase not in self.schedule.depths:
+                found.append({"step": after - 1, "condition": f"{part.element}_last = '0'", "target": first})
         return found
 
     def _sent_of(self, loop: Loop) -> list[tuple[Answer, Sent]]:
@@ -352,9 +412,8 @@ class Writer:
             found.setdefault(self.bases[phase] + step, []).append((target, text, node))
 
         for item in self.schedule.issues.values():
-            for target, operand in zip(self._operand_names(item.unit), item.node.operands, strict=True):
-                text = self._operand(item, operand)
-                found.setdefault(self.bases[item.node.phase] + item.start, []).append((target, text, item.node))
+            if item.node.phase not in self.schedule.depths:
+                found.setdefault(self.bases[item.node.phase] + item.start, []).extend(self._operands(item))
         for number, register in self.binding.by_node.items():
             node = self.program.graph.nodes[number]
             time = self.schedule.times[number]
@@ -365,12 +424,17 @@ class Writer:
                 target = self._names["carried", loop.number, carried.value.payload]
                 load(phase - 1, self.schedule.steps[phase - 1] - 1, target, carried.first, carried.value.bits)
                 assert carried.next is not None
-                if carried.next is not carried.value:
+                if carried.next is not carried.value and phase not in self.schedule.depths:
                     load(phase, self.schedule.steps[phase] - 1, target, carried.next, carried.value.bits)
         held = {item["step"] for item in self._holds()}
         return [
             {"step": step, "is_held": step in held, "lines": _commented(lines)} for step, lines in sorted(found.items())
         ]
+
+    def _operands(self, issue: Issue) -> Iterator[tuple[str, str, Node | None]]:
+        """Yield the operands of an operation: the register, the value, and the operation."""
+        for target, operand in zip(self._operand_names(issue.unit), issue.node.operands, strict=True):
+            yield target, self._operand(issue, operand), issue.node
 
     def _operand(self, issue: Issue, operand: Node) -> str:
         """Return an operand of a unit; an integer has the unit's width."""
@@ -447,14 +511,22 @@ class Writer:
 
     def _made_message(self, part: Elements, made: Made) -> Iterator[tuple[str, str]]:
         """Yield the ports of an element that a loop makes."""
-        phase, last = 2 * made.loop.number + 1, self.schedule.steps[2 * made.loop.number + 1] - 1
+        phase, last = 2 * made.loop.number + 1, self.schedule.end(2 * made.loop.number + 1)
         for port, values in made.fields.items():
             yield port, self._field(values, phase, last)
         yield from _empty(part.inner)
-        valid = f"{made.loop.stream.part.element}_valid and to_bit_of(step_r = {self.bases[phase] + last})"
-        own = {"valid": valid, "last": f"{made.loop.stream.part.element}_last", "segment_valid": f"(others => {valid})"}
+        valid, ends = self._leaves_loop(made.loop)
+        own = {"valid": valid, "last": ends, "segment_valid": f"(others => {valid})"}
         names = {item.name for item in part.ports}
         yield from ((name, text) for signal, text in own.items() if (name := f"{part.element}_{signal}") in names)
+
+    def _leaves_loop(self, loop: Loop) -> tuple[str, str]:
+        """Return the conditions that an element leaves a loop, and that it is the last one."""
+        phase, element = 2 * loop.number + 1, loop.stream.part.element
+        if phase in self.schedule.depths:
+            depth = self.schedule.depths[phase]
+            return f"{self._names['token', phase]}({depth})", f"{self._names['last', phase]}({depth})"
+        return f"{element}_valid and to_bit_of(step_r = {self.bases[phase + 1] - 1})", f"{element}_last"
 
     def _field(self, values: Sequence[Node], phase: int, step: int) -> str:
         texts = [self._quiet(node, self.value(node, phase, step)) for node in values]
@@ -501,18 +573,16 @@ class Writer:
     def _made(self, part: Part, made: Made) -> Context:
         """Return the array of numbers that a loop makes."""
         phase = 2 * made.loop.number + 1
-        last = self.schedule.steps[phase] - 1
         ((node,),) = made.fields.values()
-        element = made.loop.stream.part.element
+        valid, ends = self._leaves_loop(made.loop)
         return {
             "stream": part.stream,
             "element": part.element,
             "bits": part.bits,
             "lanes": part.bits // 8,
-            "value": self._quiet(node, self.value(node, phase, last)),
-            "step": self.bases[phase] + last,
-            "valid": f"{element}_valid",
-            "last": f"{element}_last",
+            "value": self._quiet(node, self.value(node, phase, self.schedule.end(phase))),
+            "valid": valid,
+            "last": ends,
         }
 
     def _listed(self, answer: Answer, number: int, part: Part | Elements, sent: Sent) -> Context:
@@ -541,6 +611,14 @@ class Writer:
             "ready": f"{part.element}_ready" if isinstance(part, Elements) else "",
         }
 
+    def _taken(self, loop: Loop) -> str:
+        """Return the condition that an element of the message is taken."""
+        phase = 2 * loop.number + 1
+        if phase in self.schedule.depths:
+            flow, all_ = self._names["flow", phase], self._names["all", phase]
+            return f"{flow} and at_step_r({self.bases[phase]}) and not {all_}"
+        return f"advance and to_bit_of(step_r = {self.bases[phase + 1] - 1})"
+
     def _input(self, part: Part | Elements) -> Context:
         loop = next((item for item in self.program.loops if item.number == part.number), None)
         passed = any(
@@ -558,8 +636,7 @@ class Writer:
         return {
             "ready": ready,
             "accepted": accepted,
-            "is_looped": loop is not None,
-            "step": self.bases[2 * part.number + 2] - 1 if loop else 0,
+            "taken": self._taken(loop) if loop else "",
             "numbers": numbers,
         }
 

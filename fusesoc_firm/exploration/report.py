@@ -81,7 +81,7 @@ class Report:
         return sorted(found, key=lambda item: (item.node.phase, item.first, item.last, item.line, item.node.number))
 
     def _operation(self, node: Node) -> Operation:
-        base = self.schedule.bases[node.phase]
+        base = self.schedule.starts[node.phase]
         issue = self.schedule.issues.get(node.number)
         if issue is None:
             step = base + self.schedule.times[node.number].step
@@ -104,6 +104,13 @@ class Report:
     def elements(self) -> Mapping[str, int]:
         """The cycles for each element of the arrays over which the function loops."""
         return {loop.stream.path: self.schedule.steps[2 * loop.number + 1] for loop in self.schedule.program.loops}
+
+    @property
+    def stages(self) -> Mapping[str, int]:
+        """The stages of the arrays whose elements are computed by a pipeline."""
+        depths = self.schedule.depths
+        loops = {loop.stream.path: 2 * loop.number + 1 for loop in self.schedule.program.loops}
+        return {path: depths[phase] + 1 for path, phase in loops.items() if phase in depths}
 
     @property
     def waits(self) -> Mapping[int, str]:
@@ -147,6 +154,7 @@ class Report:
             "longestLatency": self.longest,
             "interval": schedule.interval,
             "cyclesOfElements": dict(self.elements),
+            "stages": dict(self.stages),
             "estimate": estimate(schedule).data(),
             "operators": [
                 {"operator": unit_name(use.unit), "operations": use.operations, "busy": use.busy} for use in self.uses

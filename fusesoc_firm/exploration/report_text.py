@@ -23,7 +23,8 @@ def _head(report: Report) -> Iterator[str]:
     yield cut(f"{schedule.program.name}: {schedule.program.source.name}", WIDTH)
     yield f"latency {_cycles(schedule.latency)}{longest}; interval {_cycles(schedule.interval)}"
     for name, cycles in report.elements.items():
-        yield cut(f"{_cycles(cycles)} more for each element of '{name}'", WIDTH)
+        stages = f", in {report.stages[name]} stages" if name in report.stages else ""
+        yield cut(f"{_cycles(cycles)} more for each element of '{name}'{stages}", WIDTH)
     time = 1000 * schedule.latency / size.megahertz
     yield (
         f"estimate: {size.lut} LUT4, {size.ff} FF, {size.dsp} DSP, {size.megahertz:.0f} MHz in an ECP5-8: {time:.0f} ns"
@@ -39,7 +40,7 @@ def _operators(report: Report) -> Iterator[str]:
         yield "no operators: all operations are logic between registers"
         return
     rows: list[Sequence[str]] = [("operator", "operations", "busy", "use", "LUT4", "FF", "DSP", "MHz")]
-    cycles = max(1, sum(report.schedule.steps))
+    cycles = max(1, report.schedule.starts[-1])
     for use in report.uses:
         cost = use.unit.operator.cost
         numbers = use.operations, use.busy, f"{100 * use.busy / cycles:.0f} %"

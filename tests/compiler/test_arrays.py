@@ -103,6 +103,56 @@ def sums(m):
     return {"frame": m.frame, "points": [{"x": low, "y": high}], "colors": m.colors, "named": named, "tail": m.tail}
 """,
     ),
+    # The loops of the following functions are pipelines.
+    "nearer": (
+        "Summary",
+        "",
+        """
+class Nearer:
+    def __init__(self):
+        self.total = 0
+        self.rounds = 0
+
+    def __call__(self, m):
+        best, place, near = 1e9, -1, 0
+        for i, p in enumerate(m.points):
+            distance = p.x * p.x + p.y * p.y + m.first
+            if distance < best:
+                best, place = distance, i
+            if distance * 0.5 < 20.0:
+                near += 1
+        self.rounds += 1
+        self.total += near
+        return {"nearest": best, "count": place + 1, "total": self.total * 1000 + self.rounds}
+
+
+nearer = Nearer()
+""",
+    ),
+    "steps": (
+        "Points",
+        "",
+        """
+import numpy as np
+
+
+def steps(m):
+    before, points = np.float32(m.first), []
+    for i, p in enumerate(m.points):
+        points.append({"x": (p.x - before) * 3.0 + i, "y": p.y, "more": [float(p.x), before]})
+        before = p.x
+    return {"points": points, "tail": m.tail}
+""",
+    ),
+    "brighter": (
+        "Cloud",
+        "length: buffered",
+        """
+def brighter(m):
+    scale = m.corners[0].x
+    return {"colors": [int(c * 1.25) + m.first for c in m.colors], "tail": round(scale * 2)}
+""",
+    ),
     "partly": (
         "Cloud",
         "length: buffered",
@@ -117,6 +167,8 @@ def partly(m):
     ),
 }
 
+_PIPELINES = ("nearer", "steps", "brighter")
+
 
 def _specification(folder: Path, width: int, names: list[str]) -> Path:
     types, blocks = [], []
@@ -126,7 +178,8 @@ def _specification(folder: Path, width: int, names: list[str]) -> Path:
         output: dict[str, Any] = {"middleware": "ROS2", "message": f"demo_msgs/{answer}"}
         sides = {"input": [{"middleware": "ROS2", "message": "demo_msgs/Cloud"}], "output": [output]}
         output |= yaml.safe_load(keys) if keys else {}
-        types.append({"name": name, "type": "Python", "sources": f"{name}.py", "interface": sides})
+        limits = {"element": 1} if name in _PIPELINES else {}
+        types.append({**limits, "name": name, "type": "Python", "sources": f"{name}.py", "interface": sides})
         end = {"middleware": "ROS2", "name": f"{name}_out", "mode": "publisher", "message": f"demo_msgs/{answer}"}
         blocks += [
             {"middleware": "ROS2", "name": f"{name}_in", "mode": "subscriber", "message": "demo_msgs/Cloud",
@@ -155,7 +208,7 @@ def _cloud(source: random.Random) -> dict[str, Any]:
     return {
         "first": source.randrange(3),
         "frame": "f" * source.choice([0, 1, 2, 3, 9]),
-        "points": [point() for _ in range(source.choice([0, 1, 2, 7]))],
+        "points": [point() for _ in range(source.choice([0, 1, 2, 7, 30]))],
         "colors": [source.randrange(256) for _ in range(source.choice([0, 1, 3, 4, 17]))],
         "named": [named() for _ in range(source.choice([0, 1, 3]))],
         "corners": [point() for _ in range(3)],
@@ -189,10 +242,11 @@ def test_functions_of_arrays_answer_as_python_does(width: int, tmp_path: Path) -
 
 
 @pytest.mark.check
-def test_a_broken_message_has_no_answer_and_changes_no_state(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["summary", "nearer"])
+def test_a_broken_message_has_no_answer_and_changes_no_state(name: str, tmp_path: Path) -> None:
     print("seed", _SEED)
     source = random.Random(_SEED)
-    made = _built(tmp_path, 8, ["summary"], [_cloud(source) for _ in range(6)])
+    made = _built(tmp_path, 8, [name], [_cloud(source) for _ in range(6)])
     stimuli, answers = made.folder / "stimulus.txt", made.folder / "expected.txt"
     frames = re.split(r"^> .*\n", stimuli.read_text(encoding="ascii"), flags=re.MULTILINE)[1:]
     sent = ""

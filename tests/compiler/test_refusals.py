@@ -13,7 +13,9 @@ from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import message_frame
 
-SCAN = message_frame("float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n")
+SCAN = message_frame(
+    "float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\nfloat32 late\n"
+)
 ANSWER = message_frame(
     "float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nfloat32[] more\nstring name\nuint8[<=2] few\nstring<=3 short\n"
     "string[] names\nPlace[2] corners\n"
@@ -71,6 +73,9 @@ BODIES = [
     ("for i in @range(5000):\n    pass", "a loop of 5000 turns is too long", "at most 4096"),
     ("if m.p:\n    x = 1\ny = @x + 1", "'x' has no value on one of the paths", "before the 'if'"),
     ("@if m.p:\n    x = 1\nelse:\n    x = (1, 2)", "two paths leave a int and a tuple of 2", "same type"),
+    ("@if m.p:\n    x = m.n\nelse:\n    x = m.low", "two paths leave a int32 and a float32", "same type"),
+    ("x = @max(m.low, m.v[0])", "a float64 and a float32 are not one kind of number", "convert"),
+    ("x = m.n\n@for r in m.ranges:\n    x = r", "two paths leave a int32 and a float32", "same type"),
     ("x = @'a' < 'b'", "a text cannot be compared", ""),
     ("x = @m.n is m.n", "'is' is not hardware", "'=='"),
     ("x = m.v[@7]", "7 is not an index of 4 elements", ""),
@@ -100,6 +105,13 @@ RETURNS = [
     ("return {'ranges': m.name}", "'ranges' is an array of variable size", "append"),
     ("return {'ranges': m.ranges, 'more': m.ranges}", "'ranges' is sent twice", "one place"),
     ("return {'ranges': m.heights, 'more': m.ranges}", "'ranges' precedes 'more' in the answer", "one of both"),
+    ("x = 0.0\nfor r in m.ranges:\n    x = x + r * m.late\nreturn {'x': x}", "needs 'late', which follows", "earlier"),
+    ("return {'ranges': [r * m.late for r in m.ranges]}", "needs 'late', which follows", "earlier"),
+    (
+        "y = 0.0\nfor h in m.heights:\n    y = y + h\nx = y\nfor r in m.ranges:\n    x = x + r\nreturn {'x': x}",
+        "the loop over 'ranges' needs 'y', which follows",
+        "earlier",
+    ),
     (_LOOP + "return {'more': m.ranges}", "'ranges' is read by a loop and passed on", "append"),
     (_LOOP + "return {'ranges': made, 'x': total}", "'x' precedes 'ranges' in the answer", "comes earlier"),
     (_LOOP + "if total > 1.0:\n    return None\nreturn {'ranges': made}", "the condition of the answer", "earlier"),

@@ -10,12 +10,16 @@ from random import Random
 import chevron
 import pytest
 
+from fusesoc_firm.compiler.interface import side_of
+from fusesoc_firm.compiler.program import Program, Task, compile_function
 from fusesoc_firm.compiler.schedule import scheduled
+from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.system.hardware.compiled import schedule_of
 from fusesoc_firm.system.hardware.estimate import estimate
 from fusesoc_firm.system.hardware.limits import (
     BudgetError,
     LimitError,
+    Limits,
     counts_to_try,
     fastest_of_budget,
     fastest_within,
@@ -23,7 +27,7 @@ from fusesoc_firm.system.hardware.limits import (
     used,
 )
 from fusesoc_firm.text.diagnostics import InputError
-from tests.compiler.compiled import Unit, bits_of_message, placed_bits, random_messages
+from tests.compiler.compiled import Unit, bits_of_message, message_frame, placed_bits, random_messages
 from tests.hdl.ghdl import Library, core_files
 from tests.seeds import seeded
 from tests.system.systems import accelerator, converter, derived, instance, messages, specification
@@ -60,17 +64,17 @@ def test_without_a_limit_there_is_one_operator_of_a_kind(tmp_path: Path) -> None
 
 def test_a_limit_takes_as_few_more_operators_as_needed(tmp_path: Path) -> None:
     program = Unit("f", PRODUCTS).program()
-    slow, fast = fastest_within(program, {}, None), fastest_within(program, {"add": 16, "multiply": 16}, None)
+    slow, fast = fastest_within(program, {}, Limits()), fastest_within(program, {"add": 16, "multiply": 16}, Limits())
     for limit in range(fast.latency, slow.latency + 1):
-        found = fastest_within(program, {}, limit)
+        found = fastest_within(program, {}, Limits(limit))
         assert found.latency <= limit
         counts = used(found)
         for name in counts:
             fewer = counts | {name: counts[name] - 1}
-            assert not fewer[name] or fastest_within(program, fewer, None).latency > limit, (limit, counts)
+            assert not fewer[name] or fastest_within(program, fewer, Limits()).latency > limit, (limit, counts)
     with pytest.raises(LimitError) as raised:
-        fastest_within(program, {}, fast.latency - 1)
-    assert raised.value.shortest == fast.latency
+        fastest_within(program, {}, Limits(fast.latency - 1))
+    assert (raised.value.name, raised.value.cycles) == ("latency", fast.latency)
 
 
 def test_resources_that_are_given_stay(tmp_path: Path) -> None:
@@ -94,6 +98,56 @@ def test_a_limit_that_cannot_be_met_is_refused_with_the_number_that_can_be_met(
     assert found[0] + more == shortest
     with pytest.raises(InputError):
         cycles(tmp_path, f"resources: {{multiply: 1}}, {key}: {shortest - 1}")
+
+
+LOOPS = """
+class Scan:
+    def __init__(self):
+        self.best = 0.0
+
+    def __call__(self, m):
+        best, near, before = 1e9, 0, m.low
+        for i, r in enumerate(m.ranges):
+            moved = r * 2.0 - before * m.low
+            before = r
+            if moved < best:
+                best = moved
+            if moved * 0.5 < 1.0:
+                near += i
+        self.best = best
+        return {"x": best, "i": near}
+
+
+scan = Scan()
+"""
+SCAN = message_frame("float32 low\nfloat32[] ranges\nfloat32 x\nint32 i\n")
+
+
+def scan_program(text: str) -> Program:
+    return compile_function(Task(Source("scan.py", text), "scan", [side_of("in_", SCAN)], [side_of("out_", SCAN)]))
+
+
+def test_a_loop_whose_operations_have_operators_of_their_own_is_a_pipeline() -> None:
+    program = scan_program(LOOPS)
+    one = scheduled(program)
+    assert (one.depths, one.element > 20) == ({}, True)
+    found = fastest_within(program, {}, Limits(element=1))
+    assert found.element == 1
+    assert used(found) == {"multiply": 3, "add": 1}
+    assert fastest_within(program, {}, Limits(element=one.element)).depths == {}
+    with pytest.raises(LimitError) as raised:
+        fastest_within(program, {"multiply": 2}, Limits(element=1))
+    assert (raised.value.name, raised.value.cycles > 1) == ("element", True)
+
+
+@pytest.mark.parametrize(
+    ("statement", "cycles"), [("best = best + r", 9), ("best = r / m.low", 20), ("best = max(best, r * best)", 10)]
+)
+def test_a_loop_that_waits_for_its_own_results_is_none(statement: str, cycles: int) -> None:
+    text = f"def scan(m):\n    best = m.low\n    for r in m.ranges:\n        {statement}\n    return {{'x': best}}\n"
+    with pytest.raises(LimitError) as raised:
+        fastest_within(scan_program(text), {}, Limits(element=1))
+    assert raised.value.cycles >= cycles
 
 
 def test_a_budget_selects_the_fastest_operators_within_it(tmp_path: Path) -> None:
@@ -131,11 +185,11 @@ def test_a_budget_is_kept_beside_given_operators_and_limits(tmp_path: Path) -> N
 
 
 def test_limits_are_legal_only_for_python(tmp_path: Path) -> None:
-    types = accelerator("f", "Vector3", "Vector3").replace("VHDL", "VHDL, latency: 3, interval: 4")
+    types = accelerator("f", "Vector3", "Vector3").replace("VHDL", "VHDL, latency: 3, interval: 4, element: 1")
     with pytest.raises(InputError) as raised:
         derived(tmp_path, specification(BLOCKS, types))
     assert messages(raised.value) == [
-        f"'{key}' is legal only for Python, but 'f' has the type VHDL" for key in ("latency", "interval")
+        f"'{key}' is legal only for Python, but 'f' has the type VHDL" for key in ("latency", "interval", "element")
     ]
 
 

@@ -202,7 +202,7 @@ class _Resolver:
 
     def _check_compiled(self, accelerator: Accelerator) -> None:
         """Note keys of compiled functions at an accelerator in another language, and illegal numbers of operators."""
-        for key in ("numbers", "resources", "latency", "interval"):
+        for key in ("numbers", "resources", "latency", "interval", "element"):
             if key in accelerator.places and accelerator.type and not accelerator.is_compiled:
                 message = f"'{key}' is legal only for Python, but '{accelerator.name}' has the type {accelerator.type}"
                 self.faults.error(message, accelerator.place(key), "remove the key")

@@ -10,13 +10,20 @@ from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import kind_named
 from fusesoc_firm.compiler.operators import table_files
 from fusesoc_firm.compiler.program import Program, Task, compile_function
-from fusesoc_firm.compiler.schedule import Schedule
+from fusesoc_firm.compiler.schedule import RELEASE, Schedule
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.writer import TEMPLATE, Writer
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, shown_path
 from fusesoc_firm.system.hardware.instances import declarations
-from fusesoc_firm.system.hardware.limits import BudgetError, LimitError, fastest_of_budget, fastest_within
+from fusesoc_firm.system.hardware.limits import (
+    LATENCY,
+    BudgetError,
+    LimitError,
+    Limits,
+    fastest_of_budget,
+    fastest_within,
+)
 from fusesoc_firm.system.written.specification import BUDGETS, Resources
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import Rendering
@@ -41,18 +48,22 @@ def compiler_files() -> list[Path]:
 
 def schedule_of(type_: AcceleratorType, folder: Path) -> Schedule:
     """Return the scheduled function of an accelerator. Raise `InputError` for a limit that it cannot meet, too."""
-    program, fixed, budget = program_of(type_, folder), resources_of(type_), budget_of(type_)
-    found = _of_budget(type_, program) if budget else fastest_within(program, fixed, None)
-    for key, extra in (("latency", 0), ("interval", found.interval - found.latency)):
-        limit = getattr(type_.accelerator, key)
-        if limit is not None and found.latency + extra > limit:
-            if budget:
-                _refuse_limit(type_, key, found.latency + extra)
-            try:
-                found = fastest_within(program, fixed, limit - extra)
-            except LimitError as error:
-                _refuse_limit(type_, key, error.shortest + extra)
-    return found
+    program, limits = program_of(type_, folder), _limits(type_)
+    try:
+        if not budget_of(type_):
+            return fastest_within(program, resources_of(type_), limits)
+        found = _of_budget(type_, program)
+        limits.check(found)
+        return found
+    except LimitError as error:
+        _refuse_limit(type_, error)
+
+
+def _limits(type_: AcceleratorType) -> Limits:
+    """Return the limits of an accelerator; that of the interval is one of the latency, too."""
+    accelerator = type_.accelerator
+    given = [accelerator.latency, accelerator.interval and accelerator.interval - RELEASE]
+    return Limits(min((item for item in given if item is not None), default=None), accelerator.element)
 
 
 def resources_of(type_: AcceleratorType) -> dict[str, int]:
@@ -82,12 +93,14 @@ def _of_budget(type_: AcceleratorType, program: Program) -> Schedule:
         fail(message, resources.place(name), f"legal here: at least {error.least[name]}, as estimated")
 
 
-def _refuse_limit(type_: AcceleratorType, key: str, shortest: int) -> NoReturn:
-    accelerator = type_.accelerator
+def _refuse_limit(type_: AcceleratorType, error: LimitError) -> NoReturn:
+    accelerator, key, cycles = type_.accelerator, error.name, error.cycles
+    if key == LATENCY and (accelerator.latency is None or cycles <= accelerator.latency):
+        key, cycles = "interval", cycles + RELEASE
     given = ", ".join(f"{name}: {count}" for name, count in _given(type_).items())
     within = f" with 'resources: {{{given}}}'" if given else ""
     message = f"'{key}' of '{accelerator.name}' cannot be {getattr(accelerator, key)}{within}"
-    fail(message, accelerator.place(key), f"legal here: {shortest} cycles or more")
+    fail(message, accelerator.place(key), f"legal here: {cycles} cycles or more")
 
 
 def program_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Program:

@@ -132,6 +132,7 @@ def _registers(binding: Binding) -> int:
     program = schedule.program
     found = sum(register.bits for register in binding.registers) + sum(state.value.bits for state in program.states)
     found += sum(item.value.bits for loop in program.loops for item in loop.carried.values())
+    found += sum(node.bits for node, _ in binding.delays())
     found += sum(len(unit.operator.inputs) * unit.operator.operand for unit in schedule.units)
     found += sum(unit.operator.has_wait for unit in schedule.units) + len(program.answers)
     found += sum(_streams(schedule))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import product
 from math import prod
 
@@ -17,12 +18,38 @@ from fusesoc_firm.system.hardware.estimate import estimate
 _MOST_TRIED = 200
 
 
-class LimitError(Exception):
-    """No number of operators meets a limit; `shortest` is the latency of the fastest schedule."""
+LATENCY, ELEMENT = "latency", "element"
 
-    def __init__(self, shortest: int) -> None:
-        super().__init__(f"the shortest latency is {shortest} cycles")
-        self.shortest = shortest
+
+@dataclass(frozen=True)
+class Limits:
+    """The most cycles from a message to its answer, and for an element of an array; None is no limit."""
+
+    latency: int | None = None
+    element: int | None = None
+
+    def check(self, schedule: Schedule) -> None:
+        """Raise `LimitError` if a schedule exceeds a limit."""
+        if self.latency is not None and schedule.latency > self.latency:
+            raise LimitError(LATENCY, schedule.latency)
+        if self.element is not None and schedule.element > self.element:
+            raise LimitError(ELEMENT, schedule.element)
+
+    def allow(self, schedule: Schedule) -> bool:
+        """Whether a schedule meets the limits."""
+        try:
+            self.check(schedule)
+        except LimitError:
+            return False
+        return True
+
+
+class LimitError(Exception):
+    """A schedule exceeds the limit `name`, with `cycles` cycles."""
+
+    def __init__(self, name: str, cycles: int) -> None:
+        super().__init__(f"the {name} is {cycles} cycles")
+        self.name, self.cycles = name, cycles
 
 
 def operations_of(program: Program) -> dict[str, Operator]:
@@ -54,23 +81,22 @@ def used(schedule: Schedule) -> dict[str, int]:
     return dict(widest)
 
 
-def fastest_within(program: Program, fixed: Mapping[str, int], latency: int | None) -> Schedule:
-    """Return the schedule with one operator of a kind, or with as few more as a latency in cycles needs.
+def fastest_within(program: Program, fixed: Mapping[str, int], limits: Limits) -> Schedule:
+    """Return the schedule with one operator of a kind, or with as few more as limits need.
 
-    The numbers in `fixed` are given. Fewer operators of any one kind would not meet the latency. Costly operators are
-    spared first. Raise `LimitError` if no number of operators meets it.
+    The numbers in `fixed` are given. Fewer operators of any one kind would not meet the limits. Costly operators are
+    spared first. Raise `LimitError`, with the cycles of the fastest schedule, if no number of operators meets them.
     """
     found = scheduled(program, fixed)
-    if latency is None or found.latency <= latency:
+    if limits.allow(found):
         return found
     counts = most_useful(program, fixed)
     found = scheduled(program, counts)
-    if found.latency > latency:
-        raise LimitError(found.latency)
+    limits.check(found)
     for operation in operations_of(program):
         for count in () if operation in fixed else range(1, counts[operation]):
             fewer = scheduled(program, counts | {operation: count})
-            if fewer.latency <= latency:
+            if limits.allow(fewer):
                 found, counts[operation] = fewer, count
                 break
     return found

@@ -345,7 +345,7 @@ class Accelerator(Section):
     )
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
     numbers: Text | None = key(
-        "the type of the floating-point numbers of an accelerator in Python (default: the types of the fields)",
+        "float32, float64 or fixed(W, F): all floats of an accelerator in Python (default: the types of the fields)",
         rule=numbers_fault,
         is_asked=False,
     )
@@ -357,6 +357,9 @@ class Accelerator(Section):
     )
     interval: int | None = key(
         "the most cycles between two messages of an accelerator in Python", form="integer", is_asked=False
+    )
+    element: int | None = key(
+        "the most cycles for each element of an array in an accelerator in Python", form="integer", is_asked=False
     )
 
     @property
