@@ -123,6 +123,10 @@ def prepared(module: ast.Module, numbers: str = "") -> ast.Module:
 class _Replaced(ast.NodeTransformer):
     is_fixed: bool
 
+    def visit_Dict(self, node: ast.Dict) -> ast.AST:
+        self.generic_visit(node)
+        return ast.copy_location(ast.Call(ast.Name("dict", ast.Load()), [node], []), node)
+
     def visit_Constant(self, node: ast.Constant) -> ast.AST:
         if not self.is_fixed or not isinstance(node.value, float):
             return node
@@ -311,6 +315,8 @@ def begin(module: ModuleType, numbers: str = "") -> None:
         _firm_floor_quotient=floor_quotient,
         _firm_remainder=remainder,
         _firm_adopt=partial(_adopt, module, format_),
+        # The messages that a function makes have attributes, too.
+        dict=Message,
         **_BUILTINS,
     )
     if format_:

@@ -15,6 +15,10 @@ class Message(dict[str, Any]):
         except KeyError:
             raise AttributeError(f"the message has no field '{name}'", name=name, obj=self) from None
 
+    def copy(self) -> Message:
+        """Return a copy of the message, whose nested messages are the same."""
+        return Message(self)
+
     def __setattr__(self, name: str, value: Any) -> None:
         self[name] = value
 

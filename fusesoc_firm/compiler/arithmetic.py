@@ -15,7 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted, integer_of, saturated, shifted
+from fusesoc_firm.compiler.conversions import (
+    UnmergeableError,
+    check_exact,
+    common_kind,
+    converted,
+    integer_of,
+    saturated,
+    shifted,
+)
 from fusesoc_firm.compiler.fixed import FixedNumber, Format
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import (
@@ -371,8 +379,11 @@ class Arithmetic:
         """Return one of two numbers, in their common kind."""
         try:
             kind = common_kind(one.kind, other.kind)
+            for value in (one, other):
+                check_exact(value, kind)
         except UnmergeableError as error:
-            raise RefusalError(f"{error} are not one kind of number", "convert one of them") from None
+            hint = "give both the same type, as numpy.float32(...) does"
+            raise RefusalError(f"{error} are not one kind of number", hint) from None
         return self.graph.choose(condition, self._to(one, kind), self._to(other, kind))
 
     def largest(self, one: Node, other: Node) -> Node:

@@ -25,6 +25,7 @@ from fusesoc_firm.compiler.values import (
 from fusesoc_firm.text.diagnostics import nearest
 
 _DEEPEST = 50
+EXTREMES = ("min", "max")
 
 
 @dataclass
@@ -38,6 +39,10 @@ class Calls(Expressions):
     @abstractmethod
     def fixed(self, node: ast.expr) -> Sequence[Value]:
         """Return the values of a loop that has a fixed number of them."""
+
+    @abstractmethod
+    def reduced_stream(self, name: str, node: ast.Call) -> Node | None:
+        """Return the result of `min`, `sum` and so on of an array of variable size, or None for another argument."""
 
     def call(self, function: Function, values: Sequence[Value], named: Mapping[str, Value], node: ast.AST) -> Value:
         """Return the result of a function of the source, whose statements are run here."""
@@ -146,7 +151,7 @@ class Calls(Expressions):
 
     def _known_call(self, name: str, node: ast.Call) -> Value:
         """Return the result of a function of Python, `math` or NumPy."""
-        if node.keywords and name != "dict":
+        if node.keywords and name != "dict" and not _has_default(name, node):
             self.refuse(node.keywords[0], f"'{name}' has no such parameter in hardware", "give the values in order")
         match name:
             case "len":
@@ -162,6 +167,8 @@ class Calls(Expressions):
                 return self._reduced(name, node)
         if name not in CALLS:
             module = name.rpartition(".")[0]
+            if name == "print":
+                self.refuse(node, "'print' is not hardware", "remove it")
             known = [item.rpartition(".")[2] for item in CALLS if item.rpartition(".")[0] == module]
             hint = (
                 nearest(name.rpartition(".")[2], known)
@@ -190,7 +197,11 @@ class Calls(Expressions):
     def _reduced(self, name: str, node: ast.Call) -> Node:
         """Return the sum, the extreme or the conjunction of the elements of a list of fixed size."""
         argument = node.args[0]
+        if (found := self.reduced_stream(name, node)) is not None:
+            return found
         values = self._fixed_numbers(argument)
+        if not values and node.keywords:
+            values = [self.number(node.keywords[0].value)]
         if name == "sum":
             values = [self.graph.constant(0), *values]
         if name in ("any", "all"):
@@ -220,3 +231,8 @@ class Calls(Expressions):
             if not isinstance(value, Node):
                 self.refuse(node, f"{described(value)} is not a number")
         return [*values]
+
+
+def _has_default(name: str, node: ast.Call) -> bool:
+    """Whether the only parameter of an extreme by its name is its value without elements."""
+    return name in EXTREMES and len(node.args) == 1 and [item.arg for item in node.keywords] == ["default"]

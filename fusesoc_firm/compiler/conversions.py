@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import operator
 
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, number_of, result_kind
+from fusesoc_firm.compiler.kinds import BOOL, FLOAT, INT, Kind, number_of, result_kind
 
 
 class UnmergeableError(Exception):
@@ -89,12 +90,41 @@ def kind_of_both(one: Kind, other: Kind) -> Kind:
     return result_kind(operator.add, one, other)
 
 
+def merged(graph: Graph, value: Node, kind: Kind) -> Node:
+    """Return the number that one path leaves, in the kind that a name has after both.
+
+    Raise `UnmergeableError` if this changes it: Python keeps its own floats and integers as they are.
+    """
+    check_exact(value, kind)
+    return converted(graph, value, kind)
+
+
+def check_exact(value: Node, kind: Kind) -> None:
+    """Raise `UnmergeableError` if a number of Python is not the same number in a type of NumPy."""
+    if not value.kind.is_weak or value.kind == kind or kind.is_weak or kind.format:
+        return
+    if value.is_constant:
+        # Compared as numbers of Python, since NumPy would convert the other one first.
+        same = number_of(kind, value.payload).item()
+        if same == value.payload or math.isnan(same):
+            return
+        raise UnmergeableError(f"{value.payload}, which is not an exact {kind}, and a {kind}")
+    if value.kind.is_float or kind.is_float:
+        if kind.bits == FLOAT.bits:
+            return
+    elif kind.limits[0] <= value.low and value.high <= kind.limits[1]:
+        return
+    raise UnmergeableError(f"a {value.kind} of Python and a {kind}")
+
+
 def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:
     """Return the kind and limits of a number that is `first`, and is replaced by `after` again and again.
 
     `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
     """
     kind = common_kind(first.kind, after.kind)
+    for value in (first, after):
+        check_exact(value, kind)
     if kind.is_float:
         return kind, 0, 0
     if kind.format:

@@ -27,6 +27,15 @@ from fusesoc_firm.compiler.values import (
 )
 from fusesoc_firm.text.diagnostics import nearest
 
+# What takes the place of the methods of a node, by a part of their names.
+_OF_NODES = {
+    "log": "remove the logging",
+    "publish": "return the message",
+    "create_": "the interface of the accelerator has the topics",
+    "parameter": "give it a value in __init__",
+    "clock": "take the time from the message's header",
+}
+
 
 @dataclass
 class Expressions(Names):
@@ -221,7 +230,8 @@ class Expressions(Names):
             if isinstance(item, ast.Assign | ast.AnnAssign) and item.value and name in bound_names(item):
                 return self.expression(item.value)
         known = [*content, *(item.name for item in owner.type.body if isinstance(item, ast.FunctionDef))]
-        return self.refuse(node, f"'{owner.type.name}' has no '{name}'", nearest(name, known))
+        hint = next((hint for word, hint in _OF_NODES.items() if word in name), nearest(name, known))
+        return self.refuse(node, f"'{owner.type.name}' has no '{name}'", hint)
 
     def _item(self, owner: Value, node: ast.expr, whole: ast.AST) -> Value:
         if isinstance(node, ast.Slice):

@@ -75,7 +75,10 @@ class Names(Paths):
         if hasattr(builtins, name):
             return Named(name)
         known = [*self.names, *self.definitions] if self._frames else [*self.definitions]
-        return self.refuse(node, f"the name '{name}' has no value", nearest(name, known))
+        hint = nearest(name, known)
+        if name[0].isupper() and "did you mean" not in hint:
+            hint = "a message is a dictionary: {'linear': {'x': 0.0}}"
+        return self.refuse(node, f"the name '{name}' has no value", hint)
 
     def named(self, name: str, node: ast.AST) -> Value:
         """Return the value of a name of the function or the module."""

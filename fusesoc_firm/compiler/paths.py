@@ -125,7 +125,11 @@ class Paths:
         try:
             yield
         except UnmergeableError as error:
-            self.refuse(node, f"two paths leave {error} in one place", "give both paths the same type")
+            self.refuse(
+                node,
+                f"two paths leave {error} in one place",
+                "give both paths the same type, as numpy.float32(...) does",
+            )
 
     def _join(self, exits: list[Exit], node: ast.AST) -> None:
         """Continue with the current path, if it is alive, and those that left earlier."""

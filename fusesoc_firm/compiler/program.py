@@ -223,6 +223,9 @@ class _Run:
                     self.next[path] = self.leaves[path]
                 continue
             if not isinstance(value, Node) or not isinstance(self.first[path], Node):
+                if self.first[path] is None:
+                    hint = "give it a number in __init__, and a truth value of its own that tells whether it is set"
+                    self._refuse(f"'{path}' is None at first, and a state is a number", hint)
                 what = f"was {described(self.first[path])}, and becomes {described(value)}"
                 self._refuse(f"'{path}' {what}", "a state is a number")
             wanted = self._widened(path, self.first[path], value)
@@ -236,7 +239,7 @@ class _Run:
         try:
             return widened(first, value, self.states.get(path))
         except UnmergeableError as error:
-            self._refuse(f"'{path}' is {error}", "give it one type")
+            self._refuse(f"'{path}' is {error}", "give it one type, as numpy.float32(...) does")
 
     def _refuse(self, message: str, hint: str = "") -> NoReturn:
         self.interpreter.refuse(self.node, message, hint)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fusesoc_firm.compiler.calls import Calls
+from fusesoc_firm.compiler.calls import EXTREMES, Calls
 from fusesoc_firm.compiler.conversions import converted, widened
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import INT
@@ -23,6 +23,37 @@ _MOST_TURNS = 4096
 _MOST_ROUNDS = 40
 # The name of a loop's index among its carried values, which no name of Python equals.
 _INDEX = "$index"
+
+# The statements for each element of an array that is reduced to a number.
+_REDUCTIONS = {
+    "sum": "result = result + item",
+    "any": "if item:\n    result = True",
+    "all": "if not item:\n    result = False",
+    "min": "value = item\nif not found or value < result:\n    result = value\nfound = True",
+    "max": "value = item\nif not found or value > result:\n    result = value\nfound = True",
+}
+
+
+class _Filled(ast.NodeTransformer):
+    """Puts an expression in the place of the name `item`; the other names become none of the source."""
+
+    def __init__(self, item: ast.expr) -> None:
+        self.item = item
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id == "item":
+            return self.item
+        node.id = f"${node.id}"
+        return node
+
+
+def _reduction(name: str, item: ast.expr, place: ast.AST) -> list[ast.stmt]:
+    """Return the statements for an element of an array that is reduced."""
+    module = ast.parse(_REDUCTIONS[name])
+    for node in ast.walk(module):
+        ast.copy_location(node, place)
+    filled: ast.Module = _Filled(item).visit(module)
+    return filled.body
 
 
 @dataclass(frozen=True)
@@ -254,6 +285,33 @@ class Repetition(Calls):
         return self.memory.new(Array(), dict(enumerate(found)))
 
     _value_generatorexp = _value_listcomp
+
+    def reduced_stream(self, name: str, node: ast.Call) -> Node | None:
+        """Return the result of `min`, `sum` and so on of an array of variable size, or None for another argument."""
+        argument = node.args[0]
+        item = ast.Name("$item", ast.Load())
+        part = ast.comprehension(ast.Name("$item", ast.Store()), argument, [], 0)
+        if isinstance(argument, ast.GeneratorExp | ast.ListComp):
+            part, item = argument.generators[0], argument.elt  # type: ignore[assignment]
+            if argument.generators[1:]:
+                return None
+        over = self._iterated(part.iter)
+        if not isinstance(over, OverStream):
+            return None
+        default = next((keyword.value for keyword in node.keywords), None)
+        if name in EXTREMES and default is None:
+            message = f"the array '{over.stream.path}' may be empty, and then '{name}' has no result"
+            self.refuse(node, message, f"write {name}(..., default=math.inf)")
+        first = self.number(default) if default else self.graph.constant({"sum": 0, "all": True}.get(name, False))
+        body: list[ast.stmt] = _reduction(name, item, node)
+        for condition in reversed(part.ifs):
+            body = [ast.copy_location(ast.If(condition, body, []), node)]
+        kept = dict(self.names)
+        self.names |= {"$result": first, "$found": self.graph.constant(value=False)}
+        self._for_stream(ast.copy_location(ast.For(part.target, part.iter, body, []), node), over)
+        result: Node = self.names["$result"]
+        self.names = {name: self.names[name] for name in kept}
+        return result
 
     def _produced(self, node: ast.ListComp | ast.GeneratorExp, part: ast.comprehension, over: OverStream) -> Value:
         """Return the array that a comprehension over a stream makes, an element for each one."""

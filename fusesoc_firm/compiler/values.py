@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted, kind_of_both
+from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted, kind_of_both, merged
 from fusesoc_firm.compiler.graph import Graph, Node
 
 
@@ -132,7 +132,8 @@ class Merge:
             return one
         if isinstance(one, Node) and isinstance(other, Node):
             kind = (kind_of_both if is_field else common_kind)(one.kind, other.kind)
-            pair = converted(self.graph, one, kind), converted(self.graph, other, kind)
+            convert = converted if is_field else merged
+            pair = convert(self.graph, one, kind), convert(self.graph, other, kind)
             return self.graph.choose(self.condition, *pair)
         if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
             return tuple(self.value(*pair, name, is_field=is_field) for pair in zip(one, other, strict=True))

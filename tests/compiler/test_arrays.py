@@ -103,6 +103,22 @@ def sums(m):
     return {"frame": m.frame, "points": [{"x": low, "y": high}], "colors": m.colors, "named": named, "tail": m.tail}
 """,
     ),
+    "folded": (
+        "Summary",
+        "",
+        """
+import math
+
+
+def folded(m):
+    answer = {"nearest": 0.0, "total": len(m.points)}
+    answer.nearest = min((p.x for p in m.points if p.y != 0.5), default=math.inf)
+    answer["count"] = sum(m.colors)
+    if any(n.weight > 5 for n in m.named):
+        answer.total += 1000
+    return answer
+""",
+    ),
     # The loops of the following functions are pipelines.
     "nearer": (
         "Summary",

@@ -65,6 +65,9 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     if found is None:
         near = closest(function_name(type_), [item.name for item in module.body if isinstance(item, ast.FunctionDef)])
         renamed = f"rename '{near}' to '{function_name(type_)}'; " if near else ""
+        classes = [item.name for item in module.body if isinstance(item, ast.ClassDef)]
+        if same := [name for name in classes if name.lower() == function_name(type_).replace("_", "").lower()]:
+            renamed = f"construct the object: {function_name(type_)} = {same[0]}(); "
         faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, renamed + hint)
     elif isinstance(found, ast.FunctionDef) and not takes(found.args, len(type_.inputs)):
         count = len(type_.inputs)
