@@ -51,7 +51,7 @@ bool q
 float64[3] v
 int16[4] w
 """
-CORES = ("axis/package", "acc/float/float", "acc/python/python")
+CORES = ("axis/package", "acc/float/float", "acc/fixed/fixed", "acc/python/python")
 _TEMPLATE = Path(__file__).parent / "compiled_bench.vhd.mustache"
 _HANDSHAKE = ("segment_valid", "msg_valid", "msg_ready")
 
@@ -119,7 +119,8 @@ def placed_bits(prefix: str) -> tuple[list[dict[str, str]], int]:
         if side == prefix and port.name not in _HANDSHAKE:
             width = port.width or 1
             bits = f"({low})" if port.width is None else f"({low + width - 1} downto {low})"
-            found.append({"port": f"{prefix}{port.name}", "bits": bits})
+            verilog = f"[{low}]" if port.width is None else f"[{low + width - 1}:{low}]"
+            found.append({"port": f"{prefix}{port.name}", "bits": bits, "verilog": verilog})
             low += width
     return found, low
 
@@ -167,9 +168,7 @@ def simulated(
 ) -> dict[Unit, list[dict[str, Any] | None]]:
     """The answers of the hardware of all units to all messages."""
     firm, work = Library("firm", folder), Library("work", folder)
-    firm.analyse(
-        core_files("axis/package", "acc/cordic/cordic", "acc/float/float", "acc/fixed/fixed", "acc/python/python")
-    )
+    firm.analyse(core_files("acc/cordic/cordic", *CORES))
     for unit in units:
         (folder / f"{unit.name}.vhd").write_text(unit.vhdl(), encoding="utf-8")
     (inputs, in_bits), (outputs, out_bits) = placed_bits("in_"), placed_bits("out_")
@@ -191,10 +190,11 @@ def simulated(
     generics: dict[str, Generic] = {"VECTORS": str(folder / "vectors.txt"), "RESULTS": f"{folder}/", "SEED": seed}
     found = work.run("compiled_bench", generics, seconds=600)
     assert found.exit_code == 0, found.output
-    return {unit: _answers(folder / f"{unit.name}.txt") for unit in units}
+    return {unit: answers_of(folder / f"{unit.name}.txt") for unit in units}
 
 
-def _answers(path: Path) -> list[dict[str, Any] | None]:
+def answers_of(path: Path) -> list[dict[str, Any] | None]:
+    """The answers that a bench wrote, None where none was sent."""
     return [None if line == "-" else _message(line) for line in path.read_text().split()]
 
 
