@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.compiler.fixed import MOST_BITS
+from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import Unit, differences, message_frame, random_messages, simulated
 from tests.compiler.random_functions import RandomFunction
 
@@ -227,11 +228,24 @@ def test_random_functions_of_fixed_point_numbers(functions: int, messages: int, 
         # The constants of the functions are below 100.
         width = source.randint(9, MOST_BITS)
         numbers = f"fixed({width}, {source.randint(0, width - 8)})"
-        texts = [RandomFunction(source, f"f{number}", large="7.5", huge="9").text() for number in range(functions)]
-        units = [Unit(f"f{number}", text, numbers, {"multiply": 1 + number % 2}) for number, text in enumerate(texts)]
+        units = [_fixed_unit(source, number, numbers) for number in range(functions)]
         folder = tmp_path / str(seed)
         folder.mkdir()
         check(units, messages, folder, seed)
+
+
+def _fixed_unit(source: random.Random, number: int, numbers: str) -> Unit:
+    """A random function; one with a constant that the numbers do not hold is refused, and replaced by another one."""
+    while True:
+        text = RandomFunction(source, f"f{number}", large="7.5", huge="9").text()
+        unit = Unit(f"f{number}", text, numbers, {"multiply": 1 + number % 2})
+        try:
+            unit.program()
+        except InputError as error:
+            if "is out of the range of" not in str(error):
+                raise
+        else:
+            return unit
 
 
 def test_an_operation_stays_as_it_is_written() -> None:
