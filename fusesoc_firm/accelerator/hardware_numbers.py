@@ -240,11 +240,18 @@ def _modelled(name: str) -> Callable[..., Any]:
     return run
 
 
-def _angle(y: Any, x: Any) -> Any:
-    # A number of Python adopts the other one's type.
-    if isinstance(y, np.float32) or isinstance(x, np.float32):
-        y, x = (np.float32(value) if isinstance(value, int | float) else value for value in (y, x))
-    return _modelled("atan2")(y, x)
+def _in_one_type(name: str) -> Callable[..., Any]:
+    """Return a function of several numbers that has a model; a number of Python adopts the type of the others."""
+
+    def run(*values: Any) -> Any:
+        if any(isinstance(value, np.float32) for value in values):
+            values = tuple(np.float32(value) if type(value) in (int, float) else value for value in values)
+        return _modelled(name)(*values)
+
+    return run
+
+
+_angle = _in_one_type("atan2")
 
 
 def _tangent(value: Any) -> Any:
@@ -269,6 +276,8 @@ _MATH: Mapping[str, Callable[..., Any]] = {
     "trunc": lambda value: _whole(value, math.trunc),
     "hypot": _hypotenuse,
     "atan2": _angle,
+    # Python has it from 3.13 on.
+    "fma": _in_one_type("multiply_add"),
     "atan": lambda value: _angle(value, 1.0),
     "asin": lambda value: _angle(value, _other_leg(value)),
     "acos": lambda value: _angle(_other_leg(value), value),
@@ -328,7 +337,7 @@ def _adopt(module: ModuleType, format_: Format | None) -> None:
     replaced: dict[int, Any] = {}
     for library, functions in ((math, _MATH), (np, _NUMPY)):
         known = {**functions, **(_fixed(library, functions, format_) if format_ else {})}
-        replaced |= {id(getattr(library, name)): function for name, function in known.items()}
+        replaced |= {id(vars(library)[name]): function for name, function in known.items() if name in vars(library)}
         replaced[id(library)] = SimpleNamespace(**{**vars(library), **known})
     for name, value in [*vars(module).items()]:
         if id(value) in replaced:
@@ -345,7 +354,7 @@ def _fixed(library: ModuleType, functions: Mapping[str, Callable[..., Any]], for
     for full in CALLS:
         module, _, name = full.rpartition(".")
         if module == library.__name__ and name not in _EXACT:
-            made[name] = partial(_through, functions.get(name, getattr(library, name)), format_)
+            made[name] = partial(_through, functions.get(name) or getattr(library, name), format_)
     return made | {name: getattr(library, name) for name in _EXACT if name in functions} | _types(library, format_)
 
 

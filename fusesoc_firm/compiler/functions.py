@@ -84,6 +84,7 @@ CALLS: Mapping[str, Call] = MappingProxyType(
         "math.ceil": _one("ceiling"),
         "math.trunc": _one("truncated"),
         "math.atan2": Call(2, 2, lambda arithmetic, values: arithmetic.function("atan2", *values)),
+        "math.fma": Call(3, 3, lambda arithmetic, values: arithmetic.function("multiply_add", *values)),
         "math.exp": Call(1, 1, lambda arithmetic, values: arithmetic.function("exp", *values)),
         "math.log": Call(1, 1, lambda arithmetic, values: arithmetic.function("log", *values)),
         "math.sin": _one("sine"),

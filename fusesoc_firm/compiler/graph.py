@@ -6,7 +6,7 @@
 | input | - | the bits of a port that `payload` names |
 | state, carried, final | - | a register: of a state, of a value between the elements of a loop, and after the loop |
 | add, subtract, multiply, divide, square_root | numbers of the result's kind | correctly rounded; saturated, if fixed |
-| atan2, exp, log | floats of the result's kind | that of the operator's model |
+| multiply_add, atan2, exp, log | floats of the result's kind | that of the operator's model |
 | sincos | a float | a pair: its sine and its cosine, those of the operator's model |
 | divmod | two integers | a pair: the quotient, rounded down, and the remainder; both 0 by zero |
 | sine, cosine, quotient, remainder | the pair | one of its numbers |

@@ -24,7 +24,7 @@ _NAMES = {
     "to_float": "from_fixed",
     "to_integer": "to_fixed",
     "resize": "resize",
-    **{name: name for name in ("atan2", "exp", "log", "sincos", "divmod")},
+    **{name: name for name in ("multiply_add", "atan2", "exp", "log", "sincos", "divmod")},
 }
 # Those with two results.
 _PAIRS = ("sincos", "divmod")

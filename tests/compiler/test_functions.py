@@ -63,10 +63,14 @@ def divmod_(a, b):
     return a // b * 1000.0 + a % b
 """,
     "limits": """
+import math
+
+
 def limits(m):
     return {
         "a": max(m.a, m.v[0], m.b, m.v[1]), "b": min(m.v[0], m.b, m.v[1], m.a), "c": max(m.c, 0.0), "d": min(m.d, m.c),
-        "p": m.v[0] < -m.v[0], "q": m.c <= -m.c, "v": [max(m.v[2], -m.v[2]), min(m.v[2], -m.v[2]), m.v[0]],
+        "p": m.v[0] < -m.v[0], "q": math.fma(m.c, m.d, 0.1) <= -m.c, "n": int(math.fma(m.a, m.b, m.v[0])),
+        "v": [max(m.v[2], -m.v[2]), min(m.v[2], -m.v[2]), m.v[0]],
     }
 """,
     # A value that is used again after its neighbours have appeared needs its own register.
