@@ -313,9 +313,9 @@ class Writer:
             "type": vhdl_type(operator.width),
             "has_wait": operator.has_wait,
             "is_pipeline": not operator.has_wait,
-            "taken": " or ".join(f"step_r = {step}" for step in sorted(steps)),
+            "taken": " or ".join(f"at_step_r({step})" for step in sorted(steps)),
             "flow": " and ".join(self._names["flow", phase] for phase in self._pipelines_of(unit)) or "'1'",
-            "starts": " or ".join(f"step_r = {self.bases[item.node.phase] + item.start}" for item in issues),
+            "starts": " or ".join(f"at_step_r({self.bases[item.node.phase] + item.start})" for item in issues),
         }
 
     def _pipelines_of(self, unit: Unit) -> list[int]:
@@ -526,7 +526,7 @@ class Writer:
         if phase in self.schedule.depths:
             depth = self.schedule.depths[phase]
             return f"{self._names['token', phase]}({depth})", f"{self._names['last', phase]}({depth})"
-        return f"{element}_valid and to_bit_of(step_r = {self.bases[phase + 1] - 1})", f"{element}_last"
+        return f"{element}_valid and at_step_r({self.bases[phase + 1] - 1})", f"{element}_last"
 
     def _field(self, values: Sequence[Node], phase: int, step: int) -> str:
         texts = [self._quiet(node, self.value(node, phase, step)) for node in values]
@@ -617,7 +617,7 @@ class Writer:
         if phase in self.schedule.depths:
             flow, all_ = self._names["flow", phase], self._names["all", phase]
             return f"{flow} and at_step_r({self.bases[phase]}) and not {all_}"
-        return f"advance and to_bit_of(step_r = {self.bases[phase + 1] - 1})"
+        return f"advance and at_step_r({self.bases[phase + 1] - 1})"
 
     def _input(self, part: Part | Elements) -> Context:
         loop = next((item for item in self.program.loops if item.number == part.number), None)
