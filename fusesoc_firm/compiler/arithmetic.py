@@ -382,7 +382,7 @@ class Arithmetic:
             for value in (one, other):
                 check_exact(value, kind)
         except UnmergeableError as error:
-            hint = "give both the same type, as numpy.float32(...) does"
+            hint = "give both the same type, as int() or numpy.float32() does"
             raise RefusalError(f"{error} are not one kind of number", hint) from None
         return self.graph.choose(condition, self._to(one, kind), self._to(other, kind))
 

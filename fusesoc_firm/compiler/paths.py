@@ -128,7 +128,7 @@ class Paths:
             self.refuse(
                 node,
                 f"two paths leave {error} in one place",
-                "give both paths the same type, as numpy.float32(...) does",
+                "give both paths the same type, as int() or numpy.float32() does",
             )
 
     def _join(self, exits: list[Exit], node: ast.AST) -> None:

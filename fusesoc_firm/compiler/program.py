@@ -239,7 +239,7 @@ class _Run:
         try:
             return widened(first, value, self.states.get(path))
         except UnmergeableError as error:
-            self._refuse(f"'{path}' is {error}", "give it one type, as numpy.float32(...) does")
+            self._refuse(f"'{path}' is {error}", "give it one type, as int() or numpy.float32() does")
 
     def _refuse(self, message: str, hint: str = "") -> NoReturn:
         self.interpreter.refuse(self.node, message, hint)

@@ -174,9 +174,11 @@ class Repetition(Calls):
             turn(loop)
             self._join(turns.continues, node)
             self._turns.pop()
-            changed = self._changes(loop, carried, names, memory, node)
-            if not changed:
+            lost = self._lost(names)
+            changed = {} if lost else self._changes(loop, carried, names, memory, node)
+            if not changed and not lost:
                 break
+            names |= lost
             carried |= changed
         else:
             self.refuse(node, "the types of this loop's values cannot be determined", "give them a type of NumPy")
@@ -204,6 +206,18 @@ class Repetition(Calls):
             for key, value in content.items():
                 yield (owner, key), value
 
+    def _lost(self, names: Mapping[str, Value]) -> dict[str, Unbound]:
+        """Return the names that have a number or another value before the loop, and none that hardware holds in it.
+
+        They have no value before the loop assigns one, nor after it.
+        """
+        pairs = {key: (names[key], self.names[key]) for key in names if not isinstance(names[key], Unbound)}
+        return {
+            key: Unbound(key)
+            for key, (before, after) in pairs.items()
+            if before is not after and not (isinstance(before, Node) and isinstance(after, Node))
+        }
+
     def _changes(
         self, loop: Loop, carried: Mapping[Any, Carried], names: Mapping[str, Value], memory: Memory, node: ast.AST
     ) -> dict[Any, Carried]:
@@ -213,6 +227,8 @@ class Repetition(Calls):
         for key, before in self._places(names, memory):
             after = now[key]
             known = carried.get(key)
+            if isinstance(before, Unbound):
+                continue
             if after is (known.value if known else before):
                 if known:
                     loop.carried[key].next = known.value

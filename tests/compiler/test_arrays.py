@@ -114,6 +114,10 @@ def folded(m):
     answer = {"nearest": 0.0, "total": len(m.points)}
     answer.nearest = min((p.x for p in m.points if p.y != 0.5), default=math.inf)
     answer["count"] = sum(m.colors)
+    # The name of an element has one value for each loop.
+    p = "none"
+    for p in m.corners:
+        answer["count"] += int(p.x > 0.0)
     if any(n.weight > 5 for n in m.named):
         answer.total += 1000
     return answer

@@ -14,7 +14,8 @@ from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import message_frame
 
 SCAN = message_frame(
-    "float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\nfloat32 late\n"
+    "float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n"
+    "uint8 k\nfloat32 late\n"
 )
 ANSWER = message_frame(
     "float32 x\nint32 i\nuint8 k\nfloat32[] ranges\nfloat32[] more\nstring name\nuint8[<=2] few\nstring<=3 short\n"
@@ -82,6 +83,13 @@ BODIES = [
     ("x = min(m.low, 1.0, @default=1.0)", "'min' has no such parameter", "in order"),
     ("x = @Twist()", "the name 'Twist' has no value", "a message is a dictionary"),
     ("x = m.n\n@for r in m.ranges:\n    x = r", "two paths leave a int32 and a float32", "same type"),
+    (
+        "for r in m.ranges:\n    pass\nfor r in m.heights:\n    x = r\ny = @r + 1",
+        "'r' has no value on one of",
+        "before",
+    ),
+    ("n = m.n * 2\nx = 'a'\nfor x in m.ranges:\n    pass\ny = @x", "'x' has no value on one of the paths", "before"),
+    ("k = len(m.ranges)\n@for h in m.heights:\n    k = k + m.k", "a int of Python and a uint8", "int\\(\\)"),
     ("x = @'a' < 'b'", "a text cannot be compared", ""),
     ("x = @m.n is m.n", "'is' is not hardware", "'=='"),
     ("x = m.v[@7]", "7 is not an index of 4 elements", ""),
