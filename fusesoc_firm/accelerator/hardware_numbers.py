@@ -32,6 +32,7 @@ _OPERATORS = {
     ast.FloorDiv: "_firm_floor_quotient",
     ast.Mod: "_firm_remainder",
 }
+_ENCODINGS = {DataKind.STRING: "utf-8", DataKind.WSTRING: "utf-16-le"}
 _IMPORTS = (ast.Import, ast.ImportFrom)
 _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
@@ -39,8 +40,28 @@ _LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 def typed(frame: Frame, message: Mapping[str, Any], numbers: str = "") -> Message:
     """Return a message with numbers of NumPy; floats have the type `numbers`, if it is given."""
     types = {part.names: _type(part, numbers) for part in _numbers(frame)}
+    for node in all_nodes(frame.nodes):
+        if isinstance(node, Data) and node.kind in _ENCODINGS:
+            types[node.names] = partial(_Text.of, _ENCODINGS[node.kind])
     made: Message = _typed(message, (), types)
     return made
+
+
+class _Text(str):
+    """A text whose length is that of hardware: the number of its bytes, or of its UTF-16 units."""
+
+    __slots__ = ("units",)
+    units: int
+
+    @classmethod
+    def of(cls, encoding: str, text: str) -> _Text:
+        """Return a text of a message."""
+        made = cls(text)
+        made.units = len(text.encode(encoding, "surrogatepass")) // len("a".encode(encoding))
+        return made
+
+    def __len__(self) -> int:
+        return self.units
 
 
 def _numbers(frame: Frame) -> Iterator[FrameField | Data]:
@@ -74,7 +95,7 @@ def _typed(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], Ca
         return Message({name: _typed(item, (*path, name), types) for name, item in value.items()})
     if isinstance(value, list | bytes | bytearray):
         return [_typed(item, path, types) for item in value]
-    return types[path](value) if path in types and not isinstance(value, str) else value
+    return types[path](value) if path in types else value
 
 
 def plain(frame: Frame, answer: Any) -> Any:
@@ -89,6 +110,8 @@ def _plain(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], An
     if isinstance(value, list | tuple):
         return [_plain(item, path, types) for item in value]
     wire = types.get(path)
+    if isinstance(value, _Text):
+        return str(value)
     if isinstance(value, float | np.floating | FixedNumber):
         number = float(value)
         return math.nan if math.isnan(number) else number
