@@ -376,10 +376,12 @@ class Writer:
         return [{"step": step, "condition": " and ".join(conditions)} for step, conditions in sorted(found.items())]
 
     def _segment(self, number: int) -> str:
-        """Return the condition that the fields of a segment are valid."""
+        """Return the condition that the fields of a segment are valid; no field may follow the last array."""
         conditions = ["is_open"]
         conditions += [
-            f"{side.prefix}segment_valid({number})" for side in self.program.inputs if not side.is_fixed and number
+            f"{side.prefix}segment_valid({number})"
+            for side in self.program.inputs
+            if not side.is_fixed and 0 < number < side.segments
         ]
         return " and ".join(conditions)
 
