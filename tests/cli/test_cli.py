@@ -498,10 +498,10 @@ def test_init_extends_only_a_specification(
 def test_what_is_doubtful_is_told_and_goes_on(capsys: Captured, tmp_path: Path) -> None:
     """`warning` goes to the standard error, so that the standard output is unchanged."""
     spec = tmp_path / "robot.yaml"
-    ends = ", middleware: ROS, message: geometry_msgs/Point, topic: point"
+    ends = ", middleware: ROS, message: geometry_msgs/Point, topic: "
     spec.write_text(
-        f"project: {{name: robot}}\nblocks:\n- {{name: sub, mode: subscriber{ends}, outgoing: [{{name: pub}}]}}\n"
-        f"- {{name: pub, mode: publisher{ends}}}\n",
+        f"project: {{name: robot}}\nblocks:\n- {{name: sub, mode: subscriber{ends}point, outgoing: [{{name: pub}}]}}\n"
+        f"- {{name: pub, mode: publisher{ends}/point}}\n",
         encoding="utf-8",
     )
     for command in ("check", "show"):

@@ -349,15 +349,13 @@ def test_an_id_is_one_byte(tmp_path: Path, count: int, fault: str) -> None:
 
 
 def test_faults_of_connections_are_those_of_hardware(tmp_path: Path) -> None:
-    """Whatever an accelerator's type is, its messages must come from somewhere."""
+    """Whatever an accelerator's type is, its messages come from somewhere; those of software do not meet others."""
     blocks = converter("sub", "subscriber", "Point", "a") + instance("a", "hard", "pub") + instance("s", "soft", "pub")
     for kind in (TYPES, TYPES.replace("ROS-SW", "VHDL, sources: acc.vhd")):
         with pytest.raises(InputError) as raised:
             derived(tmp_path, specification(blocks + converter("pub", "publisher", "Point"), kind))
-        assert [message.partition(" (")[0] for message in messages(raised.value)] == [
-            "input 'in_' of 's'",
-            "'pub' already receives this message",
-        ]
+        twice = ["'pub' already receives this message"] if kind == TYPES else []
+        assert [message.partition(" (")[0] for message in messages(raised.value)] == ["input 'in_' of 's'", *twice]
 
 
 # --- any system -------------------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ An impossible connection is reported as one fault; messages that are missing as 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 
@@ -34,6 +34,7 @@ class Wiring:
     The other attributes prevent follow-up errors in faulty specifications. `has_more_blocks` is set if some blocks have
     unreadable names, `has_more_messages` if some connections have unknown messages. `strays` are the messages of
     unreadable connections. `ambiguous` are names that several blocks share; the tables contain the first such block.
+    `software` are the blocks in software.
     """
 
     blocks: Mapping[str, Block]
@@ -44,10 +45,13 @@ class Wiring:
     has_more_messages: bool = False
     strays: set[tuple[MessageName, Middleware]] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
+    software: frozenset[str] = frozenset()
     # The fields carried from each source to each of its sinks, and the connection that drives each field of a sink.
     sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
     driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
+    # The sinks that several blocks feed with whole messages.
+    merged: set[End] = field(default_factory=set)
     # The ends of connections that could not be made.
     broken_sources: set[str] = field(default_factory=set)
     broken_sinks: set[str] = field(default_factory=set)
@@ -78,12 +82,21 @@ class Wiring:
         if not pairs:
             return False
         free = [pair for pair in pairs if self._rivals(outgoing, pair, pairs[pair]) is None]
+        if not free and (pair := self._mergeable(block, outgoing, pairs)):
+            source, sink = self._source(block, pair), self._sink(outgoing, pair)
+            self.frames[source] = pair[0].frame
+            self.merged.add(sink)
+            self.sinks.setdefault(source, {})[sink] = pairs[pair]
+            return True
         if not free:
             rival = self._rivals(outgoing, *next(iter(pairs.items())))
             if outgoing.name not in self.ambiguous and rival:
                 name, first = rival
                 what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
-                hint = f"a field can come from only one block; the first connection is at {first.name.source}"
+                hint = (
+                    f"the first connection is at {first.name.source}; messages of several blocks can meet at an input"
+                )
+                hint += " if each block provides the same fields"
                 self.faults.error(f"'{outgoing.name}' already receives {what}", outgoing.name.source, hint)
             return False
         pair = self._chosen(block, free)
@@ -149,6 +162,17 @@ class Wiring:
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 
+    def _mergeable(self, block: Block, outgoing: Outgoing, pairs: Mapping[Pair, frozenset[Names]]) -> Pair | None:
+        """Return the sides if another block already feeds the only fitting input with the same fields."""
+        if len(pairs) != 1:
+            return None
+        ((pair, names),) = pairs.items()
+        sink = self._sink(outgoing, pair)
+        sources = [source for source, ends in self.sinks.items() if sink in ends]
+        fits = all(source.block != block.name and self.sinks[source][sink] == names for source in sources)
+        is_hardware = self.software.isdisjoint({block.name, outgoing.name, *(source.block for source in sources)})
+        return pair if sources and fits and is_hardware and outgoing.name not in self.ambiguous else None
+
     def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
         """Return the first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
@@ -209,13 +233,22 @@ class Wiring:
         for source, sinks in self.sinks.items():
             for sink in sinks:
                 graph.setdefault(sink.block, []).append(source.block)
-        while cycle := _cycle(graph):
-            order = list(self.blocks)
-            start = min(range(len(cycle)), key=lambda position: order.index(cycle[position]))
-            way = [*cycle[start:], *cycle[: start + 1]]
+        for way in cycles_of(graph, list(self.blocks)):
             self.faults.error(f"these blocks wait for each other: {' -> '.join(way)}", self.blocks[way[0]].name.source)
-            # Removing this edge breaks the cycle; there may be other cycles.
-            graph[way[1]] = [block for block in graph[way[1]] if block != way[0]]
+
+
+def cycles_of(graph: Mapping[str, Sequence[str]], order: Sequence[str]) -> Iterator[list[str]]:
+    """Yield cycles of a graph of predecessors, in the direction of the messages, until none is left.
+
+    A cycle begins and ends with the same block, the first one in `order`.
+    """
+    left = {block: list(before) for block, before in graph.items()}
+    while cycle := _cycle(left):
+        start = min(range(len(cycle)), key=lambda position: order.index(cycle[position]))
+        way = [*cycle[start:], *cycle[: start + 1]]
+        yield way
+        # Removing this edge breaks the cycle; there may be other cycles.
+        left[way[1]] = [block for block in left[way[1]] if block != way[0]]
 
 
 def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:

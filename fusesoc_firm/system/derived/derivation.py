@@ -18,6 +18,7 @@ from fusesoc_firm.system.derived.actions import actions_of
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.entities import check_entities
 from fusesoc_firm.system.derived.held import check_held
+from fusesoc_firm.system.derived.inner_topics import Met, meet
 from fusesoc_firm.system.derived.lateness import with_lateness_buffers
 from fusesoc_firm.system.derived.length import publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
@@ -88,6 +89,8 @@ def derive(
         watchdog=watchdog_of(project, scheduling, publishers, faults),
         services=flow.services,
         actions=flow.actions,
+        junctions=flow.met.junctions,
+        inner_topics=flow.met.topics,
     )
     check_entities(system, parts.blocks, faults)
     check_held(system, parts.blocks, faults)
@@ -104,7 +107,8 @@ def source_files(specification: Specification, folder: Path) -> list[Path]:
 class _Flow:
     """The data flow of a system: its hardware and software, and the connections in hardware with their lengths.
 
-    `names` are the names of message sides outside their accelerators.
+    `names` are the names of message sides outside their accelerators. `met` contains the merges and queues, and the
+    topics within the system.
     """
 
     names: Mapping[End, str]
@@ -112,20 +116,24 @@ class _Flow:
     connections: tuple[Connection, ...]
     services: tuple[Service, ...]
     actions: tuple[Action, ...]
+    met: Met
 
 
 def _data_flow(resolved: Resolved, faults: Diagnostics) -> _Flow:
     """Connect the blocks, and partition them into hardware and software."""
     blocks, inputs, outputs = resolved.blocks, resolved.inputs, resolved.outputs
     names = message_names(blocks, inputs, outputs)
-    check_topics(resolved.topic_uses(names), faults)
-    connections = resolved.wiring(faults).connect()
+    uses = tuple(resolved.topic_uses(names))
+    check_topics(uses, faults)
+    wiring = resolved.wiring(faults)
+    before = Met(blocks, inputs, outputs, wiring.connect())
     software = resolved.instances(is_software=True)
-    parts = Parting(blocks, software, inputs, outputs, connections, names).parts()
+    met = meet(before, uses, wiring.merged, wiring.software, faults)
+    parts = Parting(met.blocks, software, met.inputs, met.outputs, met.connections, names).parts()
     services = services_of(blocks, parts, faults)
     actions = actions_of(blocks, parts, faults)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
-    return _Flow(names, parts, connections, services, actions)
+    return _Flow(names, parts, connections, services, actions, met)
 
 
 def _converters(

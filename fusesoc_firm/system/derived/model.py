@@ -256,6 +256,52 @@ class Connection:
 
 
 @dataclass(frozen=True)
+class Junction:
+    """A unit between connections: the merge of messages from several sources, or a queue of messages to a reader.
+
+    `block` is its name in the top level, and `topic` the name of the topic whose messages pass, if there is one. A
+    merge has two or more `sources`; a queue has one, and up to `depth` messages of fixed size. `frame` is the message
+    with the fields that the sinks use.
+    """
+
+    block: str
+    frame: Frame
+    topic: str = ""
+    sources: int = 1
+    depth: int = 0
+    overflow: Overflow = Overflow.BLOCK
+    length: PayloadLength | None = None
+
+    @property
+    def inputs(self) -> tuple[MessageSide, ...]:
+        """The inputs, numbered if there are several."""
+        prefixes = ["in_"] if self.sources == 1 else [f"in{number}_" for number in range(self.sources)]
+        return tuple(MessageSide(prefix, self.frame) for prefix in prefixes)
+
+    @property
+    def output(self) -> MessageSide:
+        """The output."""
+        return MessageSide("out_", self.frame, self.length)
+
+
+@dataclass(frozen=True)
+class InnerTopic:
+    """A topic that the system both publishes and subscribes to, by the names of the blocks.
+
+    Each of `publishers` sends to each of `readers` within the FPGA, and `to_host` also send to the host. `from_host`
+    are the readers that receive from the host as well. Without publishers and readers, all messages pass the host, for
+    a `reason`.
+    """
+
+    name: str
+    publishers: tuple[str, ...] = ()
+    readers: tuple[str, ...] = ()
+    to_host: tuple[str, ...] = ()
+    from_host: tuple[str, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True)
 class PublisherTimes:
     """The times of a publisher, in cycles; an unknown time is None.
 
@@ -426,7 +472,8 @@ class Clock:
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
-    The messages of `services` and `actions` have converters, but no topics.
+    The messages of `services` and `actions` have converters, but no topics. `junctions` are the merges and queues
+    between connections, and `inner_topics` the topics between the system's own blocks.
 
     `clock` is the frequency of clk in Hz, or None. If `watchdog` is not 0, a publisher that stops in the middle of a
     frame is cut off after `watchdog` cycles.
@@ -458,6 +505,8 @@ class DerivedSystem:
     services: tuple[Service, ...] = ()
     actions: tuple[Action, ...] = ()
     network: Network | None = None
+    junctions: tuple[Junction, ...] = ()
+    inner_topics: tuple[InnerTopic, ...] = ()
 
     @property
     def id_bytes(self) -> int:

@@ -6,7 +6,7 @@ from fusesoc_firm.system.derived.model import Converter, Overflow, Queue
 from fusesoc_firm.system.written.specification import BLOCK, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-_MOST_FRAMES = 256
+MOST_FRAMES = 256
 _MOST_BYTES = 1 << 23
 
 
@@ -19,11 +19,11 @@ def queue_of(block: Block, subscriber: Converter, project: Project, faults: Diag
     if block.queue is None:
         return _watchdog_of(block, overflow, project, faults)
     least = 2 if overflow is Overflow.DROP_OLDEST else 1
-    if not least <= block.queue <= _MOST_FRAMES:
+    if not least <= block.queue <= MOST_FRAMES:
         faults.error(
             f"'{block.name}' cannot have 'queue: {block.queue}'",
             block.place("queue"),
-            f"legal here: {least} to {_MOST_FRAMES}" + ("; a frame that is leaving is not dropped" * (least > 1)),
+            f"legal here: {least} to {MOST_FRAMES}" + ("; a frame that is leaving is not dropped" * (least > 1)),
         )
         return None
     longest = subscriber.max_length or subscriber.frame.payload_bytes

@@ -111,6 +111,7 @@ class Resolved:
             or any(block.name not in self.outputs for block in unsound),
             strays={side.kind for block in unsound for side in self.outputs.get(block.name, ())},
             ambiguous={block.name for block in lost},
+            software=frozenset(block.block for block in self.instances(is_software=True)),
         )
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:

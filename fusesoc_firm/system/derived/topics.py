@@ -1,4 +1,4 @@
-"""The legal names of topics, and the topics that several blocks of a system share."""
+"""The legal names of topics, and the types of topics that several blocks of a system share."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def check_topic_name(name: Text, faults: Diagnostics) -> None:
 
 
 def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Note each topic with two types, and warn of each topic that the system both publishes and subscribes to.
+    """Note each topic with two types.
 
     ROS 1 topics and ROS 2 topics are always distinct. Relative names are compared without a namespace.
     """
@@ -45,7 +45,6 @@ def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
     for (_, name), (first, *others) in met.items():
         for other in others:
             _check_type(name, first, other, faults)
-        _check_loop(name, (first, *others), faults)
 
 
 def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics) -> None:
@@ -53,13 +52,3 @@ def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics
     if one != two:
         message = f"topic {name} has the type {two} at '{other.topic.block}', but {one} at '{first.topic.block}'"
         faults.error(message, other.source, f"a topic has only one type; '{first.topic.block}' is at {first.source}")
-
-
-def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Warn if the system both publishes and subscribes to a topic, since the system then receives its own messages."""
-    uses = tuple(uses)
-    taking = next((use for use in uses if not use.is_published), None)
-    giving = next((use for use in uses if use.is_published), None)
-    if taking and giving:
-        message = f"'{giving.topic.block}' publishes on topic {name}, to which '{taking.topic.block}' subscribes"
-        faults.warn(message, giving.source, "the system would receive its own messages")

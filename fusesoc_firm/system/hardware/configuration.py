@@ -19,6 +19,7 @@ from fusesoc_firm.system.hardware.instances import (
     subscriber_instances,
 )
 from fusesoc_firm.system.hardware.interconnect import interconnect_configuration
+from fusesoc_firm.system.hardware.junctions import junction_configuration
 from fusesoc_firm.system.hardware.maps import instance, port_map
 from fusesoc_firm.system.hardware.names import (
     OWN_RESET,
@@ -66,6 +67,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         "subscribers": [subscriber_instances(names, converter, system) for converter in system.subscribers],
         "publishers": [publisher_instances(names, converter, system) for converter in system.publishers],
         "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
+        "junctions": [junction_configuration(names, junction, system) for junction in system.junctions],
         "pins": pin_groups(names, system),
         "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
         "connections": connections(names, system),

@@ -14,6 +14,7 @@ from fusesoc_firm.system.derived.model import (
     Converter,
     DerivedSystem,
     End,
+    Junction,
     LengthSource,
     Queue,
 )
@@ -45,6 +46,9 @@ FRAME_WORDS = (*AXIS, "tuser", "error", "error_code")
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in FRAME_WORDS)
 # Between a publisher that the watchdog may cut off and the system's errors.
 ERROR_WORDS = ("error", "error_code")
+# The levels and data of all sources of a merge, and those of its sink.
+MERGE_WORDS = tuple(f"{side}_{word}" for side in ("source", "sink") for word in ("fields", "offers", "takes"))
+QUEUE_WORDS = ("source_fields", "sink_fields")
 # Between a publisher and the FIFO for late frames.
 LATE_WORDS = (*AXIS, "tuser")
 
@@ -108,6 +112,10 @@ class Names:
         """Return a signal between a publisher and its buffer, or between a subscriber and its queue or watchdog."""
         return self._signals[block, "", f"frame_{signal}"]
 
+    def joined(self, junction: Junction, word: str) -> str:
+        """Return a signal with the fields or levels of all sides of a junction in one direction."""
+        return self._signals[junction.block, "", f"all_{word}"]
+
     def late(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its FIFO for late frames."""
         return self._signals[block, "", f"late_{signal}"]
@@ -157,6 +165,9 @@ def _signals(system: DerivedSystem) -> Iterator[_Key]:
     for item in system.publishers:
         if item.late_bytes:
             yield from ((item.block, "", f"late_{word}") for word in LATE_WORDS)
+    for junction in system.junctions:
+        words = MERGE_WORDS if junction.sources > 1 else QUEUE_WORDS
+        yield from ((junction.block, "", f"all_{word}") for word in words)
     yield from ((block.block, str(pin.name), "synced") for block, pin in synchronised_pins(system))
     yield from (_length_key(item.source) for item in system.connections if is_found_out(item))
     for crossing in all_crossings(system):
@@ -185,10 +196,28 @@ def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]
         blocks.append((converter.block, [("", port) for port in ports]))
     for block in system.accelerators:
         blocks.append((block.block, accelerator_ports(block.type)))
+    blocks += [(junction.block, junction_ports(junction, system.width)) for junction in system.junctions]
     for converter in system.publishers:
         ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
         blocks.append((converter.block, [("", port) for port in ports]))
     return blocks
+
+
+def junction_ports(junction: Junction, width: int) -> list[tuple[str, SidePort]]:
+    """Return all ports of a junction's message sides, with prefixes; it has a length only if its sources provide it."""
+    taken = [
+        (side.prefix, port)
+        for side in junction.inputs
+        for port in side_ports(side.frame, width, gives=False, has_valid=True)
+    ]
+    return taken + [(junction.output.prefix, port) for port in given_ports(junction, width)]
+
+
+def given_ports(junction: Junction, width: int) -> list[SidePort]:
+    """Return the ports of a junction's output, without its prefix."""
+    is_counted = junction.length is not None and junction.length.source is not LengthSource.GIVEN
+    ports = side_ports(junction.frame, width, gives=True, has_valid=False)
+    return [port for port in ports if port.name != PAYLOAD_LENGTH or not is_counted]
 
 
 def synchronised_pins(system: DerivedSystem) -> Iterator[tuple[AcceleratorBlock, Pin]]:

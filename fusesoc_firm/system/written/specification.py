@@ -45,7 +45,7 @@ CONVERTER, ACCELERATOR = "converter", "accelerator"
 CONVERTER_KEYS = ("middleware", "mode", "message")
 # The keys of servers and clients, and the keys for messages and topics of other converters.
 SERVICE_KEYS = frozenset({"service", "action", "timeLimit", "acceptLimit"})
-MESSAGE_KEYS = frozenset({"message", "qos", "include", "exclude"})
+MESSAGE_KEYS = frozenset({"message", "qos", "deliver", "include", "exclude"})
 # The keyword for the smallest scheduler that meets all deadlines.
 AUTO_SCHEDULER = "auto"
 # The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
@@ -73,6 +73,8 @@ PROFILES = {
     "services_default": (RELIABLE, VOLATILE, 10),
     "action_status_default": (RELIABLE, TRANSIENT_LOCAL, 1),
 }
+# The ways of a topic that the system both publishes and subscribes to.
+FABRIC, HOST, BOTH = DELIVERIES = ("fabric", "host", "both")
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
@@ -446,6 +448,13 @@ class Block(Section):
     )
     qos: Qos | None = key(
         "the quality of service of a converter's topic", form="section", section=Qos, only_of=CONVERTER, is_asked=False
+    )
+    deliver: Text | None = key(
+        "the way of a topic that the system both publishes and subscribes to: within the FPGA, by the host, or both"
+        " (default: a publisher delivers to both, a subscriber receives within the FPGA)",
+        choices=DELIVERIES,
+        only_of=CONVERTER,
+        is_asked=False,
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
