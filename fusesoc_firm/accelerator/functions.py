@@ -30,6 +30,8 @@ from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.diagnostics import fail
 
 Message = dict[str, Any]
+# The messages that may pass merges and queues because of one message from the host.
+_MOST_PASSED = 100_000
 
 
 @contextmanager
@@ -184,8 +186,22 @@ def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
     hardware = Software(blocks=system.accelerators, connections=system.connections)
     functions = Functions.of(hardware, folder)
 
+    outputs = {item.block: End(item.block, item.output.prefix) for item in system.junctions}
+
     def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
-        return functions.take(End(subscriber), message)
+        answers = []
+        left = deque(functions.take(End(subscriber), message))
+        passed = 0
+        while left:
+            name, answer = left.popleft()
+            passed += name in outputs
+            if passed > _MOST_PASSED:
+                fail(f"the messages that a message to '{subscriber}' causes circulate through '{name}' without an end")
+            if name in outputs:
+                left.extend(functions.take(outputs[name], answer))
+            else:
+                answers.append((name, answer))
+        return answers
 
     first = system.accelerators[0].type.own.accelerator.sources[0]
     return UserFunction(folder / first, "the accelerator", respond)

@@ -98,6 +98,7 @@ def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = (), *,
     """Check the system `arguments.spec`, with further stimuli, and print a summary. May raise `InputError`."""
     from fusesoc_firm.fabric.ethernet import ethernet_node, fragment_bytes, history_bytes
     from fusesoc_firm.fabric.ros1 import memory_of
+    from fusesoc_firm.system.views.inner_topics import ways_of_topics
     from fusesoc_firm.system.views.show import counts, default_lengths
 
     loaded = load(arguments)
@@ -106,7 +107,7 @@ def check_system(arguments: argparse.Namespace, stimuli: Iterable[Path] = (), *,
     memory = memory_of(system, loaded.libraries)
     node = ethernet_node(system, loaded.libraries)
     print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
-    for line in default_lengths(system):
+    for line in (*ways_of_topics(system), *default_lengths(system)):
         print(line)
     if memory:
         print(f"the node needs {len(memory)} bytes of memory for its program and texts")

@@ -16,6 +16,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in_use
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.system.derived.connections import cycles_of
+from fusesoc_firm.system.derived.joins import joins
 from fusesoc_firm.system.derived.model import (
     Connection,
     End,
@@ -270,10 +271,11 @@ def _with_junctions(before: Met, junctions: Sequence[Junction]) -> Met:
 
 @dataclass(frozen=True)
 class _Source:
-    """The source of a message, or of a part of it, with the fields that it provides."""
+    """The source of a message, or of a part of it, with the fields that it provides, and its `topic` if it has one."""
 
     end: End
     names: frozenset[Names]
+    topic: str = ""
 
 
 @dataclass
@@ -288,6 +290,8 @@ class _Meeting:
     # For each reader behind a junction, the output of the junction.
     outlets: dict[str, _Source] = field(default_factory=dict)
     links: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
+    # The links that are topics, by the names of the topics.
+    wires: dict[str, list[tuple[End, End]]] = field(default_factory=dict)
 
     @cached_property
     def _topic_of(self) -> dict[str, InnerTopic]:
@@ -383,7 +387,27 @@ class _Meeting:
                     self._link(_Source(connection.source, _names(frame)), sink)
         blocks = {name: block for name, block in self.before.blocks.items() if name not in self._removed}
         junctions = [self._with_length(item) for item in self.junctions.values()]
-        return _with_junctions(replace(self.before, blocks=blocks, connections=self._connections()), junctions)
+        topics = tuple(replace(item, wires=tuple(self.wires.get(item.name, ()))) for item in self.before.topics)
+        after = replace(self.before, blocks=blocks, connections=self._connections(), topics=topics)
+        self._warn_of_joins(after)
+        return _with_junctions(after, junctions)
+
+    def _warn_of_joins(self, after: Met) -> None:
+        """Warn of messages that reach a block on two ways, if the shorter one is a topic without a queue."""
+        topics = {sink: topic for topic in after.topics for _, sink in topic.wires}
+        for join in joins(after.connections, self.junctions):
+            if topic := topics.get(join.sink):
+                reader = next(name for name in topic.readers if join.sink in self._sinks(name))
+                shorter, longer = (" -> ".join(way) for way in (join.shorter, join.longer))
+                self.faults.warn(
+                    f"messages take two ways: {shorter} and {longer}",
+                    self.before.blocks[reader].name.source,
+                    "they stop if a block between takes a further message before it answers; add 'queue' to"
+                    f" '{reader}'",
+                )
+
+    def _sinks(self, reader: str) -> set[End]:
+        return {sink for item in self.before.connections if item.source.block == reader for sink in item.sinks}
 
     def _make_outlets(self, topic: InnerTopic, number: int) -> None:
         """Make the junctions of a topic, and note for each reader behind one the output from which it receives."""
@@ -464,10 +488,11 @@ class _Meeting:
             yield source
         elif reader in self.outlets:
             outlet = self.outlets[reader]
-            yield _Source(outlet.end, outlet.names & source.names)
+            yield replace(outlet, names=outlet.names & source.names)
         else:
-            for given in self._feeds(self._topic_of[reader].publishers[0]):
-                yield from self._resolved(_Source(given.end, given.names & source.names))
+            topic = self._topic_of[reader]
+            for given in self._feeds(topic.publishers[0]):
+                yield from self._resolved(_Source(given.end, given.names & source.names, topic.name))
 
     def _link(self, source: _Source, sink: End) -> None:
         junction = self.junctions.get(sink.block)
@@ -475,6 +500,8 @@ class _Meeting:
         for actual in self._resolved(source):
             if names := actual.names & wanted:
                 self._link_end(actual.end, names, sink)
+                if actual.topic:
+                    self.wires.setdefault(actual.topic, []).append((actual.end, sink))
 
     def _link_end(self, source: End, names: frozenset[Names], sink: End) -> None:
         sinks = self.links.setdefault(source, {})

@@ -290,7 +290,7 @@ class InnerTopic:
 
     Each of `publishers` sends to each of `readers` within the FPGA, and `to_host` also send to the host. `from_host`
     are the readers that receive from the host as well. Without publishers and readers, all messages pass the host, for
-    a `reason`.
+    a `reason`. `wires` are the sources and sinks of the topic's messages that pass no merge and no queue.
     """
 
     name: str
@@ -299,6 +299,7 @@ class InnerTopic:
     to_host: tuple[str, ...] = ()
     from_host: tuple[str, ...] = ()
     reason: str = ""
+    wires: tuple[tuple[End, End], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from fusesoc_firm.system.derived.model import (
     Connection,
     Converter,
     DerivedSystem,
+    Junction,
     PublisherTimes,
     Scheduling,
 )
@@ -55,6 +56,7 @@ THEMES = {
             "host": "#ffffff",
             "manager": "#eaeef2",
             "converter": "#dae8fc",
+            "junction": "#fff2cc",
             "accelerator": "#d5e8d4",
             "software": "#ffe6cc",
         },
@@ -67,6 +69,7 @@ THEMES = {
             "host": "#0d1117",
             "manager": "#2a313c",
             "converter": "#1c3a5e",
+            "junction": "#4d4419",
             "accelerator": "#1e4429",
             "software": "#5a3a14",
         },
@@ -147,6 +150,8 @@ class _Painter:
         for block in system.accelerators:
             lines = [*_accelerator(block), *_differences(system, block), *_pins(block)]
             self._node(graph, _name(block.block), "accelerator", lines)
+        for junction in system.junctions:
+            self._node(graph, _name(junction.block), "junction", _junction(junction))
 
     def streams(self, graph: Digraph) -> None:
         """Draw the host, the streams between host and Manager, and the converters' streams with their ids."""
@@ -162,11 +167,17 @@ class _Painter:
     def connection(self, graph: Digraph, connection: Connection) -> None:
         """Draw the ports of a connection to each of its sinks."""
         ways = crossings(self._system, connection)
+        topics = {wire: topic.name for topic in self._system.inner_topics for wire in topic.wires}
         for sink, frame, crossing in zip(connection.sinks, connection.frames, ways, strict=True):
             ports = side_ports(frame, self._system.width, gives=True, has_valid=False)
             streams = sum(port.name.endswith("_axis_tdata") for port in ports)
             bits = sum(port.width or 1 for port in ports if "_axis_t" not in port.name and not _is_handshake(port.name))
-            lines = [_amount(bits, "bit"), *([_amount(streams, "stream")] if streams else [])]
+            topic = topics.get((connection.source, sink))
+            lines = [
+                *([topic] if topic else []),
+                _amount(bits, "bit"),
+                *([_amount(streams, "stream")] if streams else []),
+            ]
             lines += [words for words in (crossing.clocks, crossing.widths) if words] if crossing else []
             ends = _name(connection.source.block), _name(sink.block)
             graph.edge(*ends, label=_label(lines), **(_CROSSING if crossing else {}))
@@ -195,6 +206,7 @@ class _Painter:
 def _has_chain(system: DerivedSystem) -> bool:
     """Whether an accelerator feeds another accelerator, which makes a picture from left to right too wide."""
     blocks = {block.block for block in (*system.accelerators, *system.software.blocks)}
+    blocks |= {junction.block for junction in system.junctions}
     connections = (*system.connections, *system.software.connections)
     return bool(system.software.blocks) or any(
         item.source.block in blocks and any(sink.block in blocks for sink in item.sinks) for item in connections
@@ -218,6 +230,11 @@ def _converter(converter: Converter) -> list[str]:
     block = [] if converter.name == f"/{converter.block}" else [converter.block]
     kind = f"used by {converter.software.block}" if converter.software else converter.name
     return [kind, *block, str(converter.frame.message), converter.frame.ros.title]
+
+
+def _junction(junction: Junction) -> list[str]:
+    kind = f"queue: {junction.depth} messages" if junction.depth else f"merge of {junction.sources}"
+    return [kind, *([junction.topic] if junction.topic else []), str(junction.frame.message)]
 
 
 def _queue(converter: Converter) -> list[str]:

@@ -27,6 +27,7 @@ from fusesoc_firm.system.derived.sides import side_ports
 from fusesoc_firm.system.derived.timing import bounds_of
 from fusesoc_firm.system.hardware.configuration import top_level_pins
 from fusesoc_firm.system.hardware.crossings import all_crossings
+from fusesoc_firm.system.views.inner_topics import topics_description
 from fusesoc_firm.system.written.specification import AXI_STREAM, DHCP
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             for block in system.accelerators
         ],
         "Connections": list(_connections(system.connections, system.width)),
+        **topics_description(system),
         **_software(system),
         **_crossings(system),
     }
