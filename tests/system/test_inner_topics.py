@@ -17,6 +17,7 @@ from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.system.views.diagram import diagram
 from fusesoc_firm.system.views.inner_topics import topics_description, ways_of_topics
 from fusesoc_firm.system.views.show import counts
+from fusesoc_firm.text.diagnostics import InputError
 from tests.system.systems import LIBRARIES, accelerator, converter, derived, instance, specification
 
 PASSING = accelerator("passing", "Point", "Point")
@@ -229,14 +230,19 @@ def test_only_fields_with_a_reader_pass_a_merge(tmp_path: Path) -> None:
     assert leaf.names == ("y",)
 
 
-def test_a_queue_breaks_a_cycle(tmp_path: Path) -> None:
-    """Its blocks are named without the queue: tests/errors/spec/inner_cycle.yaml."""
+@pytest.mark.parametrize("depth", [1, 2])
+def test_a_queue_of_two_messages_breaks_a_cycle(tmp_path: Path, depth: int) -> None:
+    """An accelerator may hold its message until its answer is taken."""
     lines = (
         converter("raw", "subscriber", "Point", "acc")
         + instance("acc", "joining", "state")
         + on("state", converter("state", "publisher", "Point"))
-        + on("state", converter("state_in", "subscriber", "Point", "acc"), ", queue: 1")
+        + on("state", converter("state_in", "subscriber", "Point", "acc"), f", queue: {depth}")
     )
+    if depth == 1:
+        with pytest.raises(InputError, match=r"wait for each other: acc -> state -> state_in -> acc"):
+            load(tmp_path, lines, JOINING)
+        return
     system, _ = load(tmp_path, lines, JOINING)
     assert ("acc", "state_in_queue/in_") in ways(system)
     assert ("state_in_queue", "acc/in1_") in ways(system)

@@ -42,6 +42,8 @@ _KEYS_OF_FRAMES = {
     SUBSCRIBER: ("max_length",),
 }
 _WRITTEN = {"max_length": "maxLength"}
+# A block in a cycle may hold its message until its answer is taken, so a queue needs room for both.
+_LEAST_IN_CYCLE = 2
 
 
 @dataclass(frozen=True)
@@ -328,7 +330,7 @@ class _Meeting:
                 graph.setdefault(sink.block, []).append(connection.source.block)
         for topic in self.topics:
             for reader in topic.readers:
-                if not _depth_of(blocks[reader]):
+                if _depth_of(blocks[reader]) < _LEAST_IN_CYCLE:
                     graph.setdefault(reader, []).extend(topic.publishers)
         for way in cycles_of(graph, list(blocks)):
             places = [name for name in way if name in self._topic_of]
@@ -339,7 +341,7 @@ class _Meeting:
             self.faults.error(
                 f"these blocks wait for each other: {' -> '.join(way)}",
                 blocks[reader].name.source,
-                f"add 'queue: <number of messages>' to '{reader}', or 'deliver: host' to '{giving}'",
+                f"add 'queue: {_LEAST_IN_CYCLE}' or more to '{reader}', or 'deliver: host' to '{giving}'",
             )
 
     def _check_fields(self, topic: InnerTopic, reader: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,10 +11,14 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.frame.codec import pack_frame
+from tests.hdl.frames import write_stimulus
+from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
 NUMBER = "std_msgs/UInt32"
 COUNT = 40
+SEED = seeded(20261130)
 
 # An accelerator that adds a number, and holds one message: it takes the next one when its answer is taken.
 _ADDING = """library ieee;
@@ -85,6 +90,45 @@ begin
   in1_msg_ready        <= valid and out_msg_ready;
 end architecture;
 """
+# An accelerator that adds up its first input, whose sum returns to it through its second input.
+_SUMMING = (
+    _JOINING.replace("entity joining", "entity summing")
+    .replace("of joining", "of summing")
+    .replace(
+        """  signal valid : std_logic;
+begin
+  valid                <= in0_msg_valid and in1_msg_valid;
+""",
+        """  signal valid   : std_logic;
+  signal first_r : std_logic := '1';
+begin
+  valid <= in0_msg_valid and (in1_msg_valid or first_r);
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        first_r <= '1';
+      elsif valid = '1' and out_msg_ready = '1' then
+        first_r <= '0';
+      end if;
+    end if;
+  end process;
+""",
+    )
+    .replace(
+        "unsigned(in0_data) + 1000 * unsigned(in1_data(15 downto 0))",
+        "unsigned(in0_data) + unsigned(in1_data)) when first_r = '0' else std_logic_vector(unsigned(in0_data)",
+    )
+    .replace("in1_msg_ready        <= valid", "in1_msg_ready        <= not first_r and valid")
+)
+# An accelerator that takes no message.
+_STUCK = _ADDING.replace("not valid_r;", "'0';").replace("<= in_msg_valid;", "<= '0';")
+
+
+def source_of(name: str) -> str:
+    """The text of an accelerator."""
+    known = {"joining": _JOINING, "summing": _SUMMING, "stuck": _STUCK.format(name="stuck", amount=0)}
+    return known.get(name) or _ADDING.format(name=name, amount=name.removeprefix("add_"))
 
 
 def side(message: str = NUMBER) -> dict[str, str]:
@@ -97,8 +141,8 @@ def converter(name: str, mode: str, topic: str, *outgoing: str, message: str = N
     return {"name": name, **side(message), "mode": mode, "topic": topic, **keys, **ways}
 
 
-def adding(name: str, amount: int, *outgoing: str) -> dict[str, Any]:
-    return {"name": name, "type": f"add_{amount}", "outgoing": [{"name": item} for item in outgoing]}
+def adding(name: str, amount: int, *outgoing: str, **keys: Any) -> dict[str, Any]:
+    return {"name": name, "type": f"add_{amount}", **keys, "outgoing": [{"name": item} for item in outgoing]}
 
 
 @dataclass(frozen=True)
@@ -107,25 +151,25 @@ class Case:
 
     blocks: Sequence[Mapping[str, Any]]
     answers: Mapping[str, Mapping[str, int]]
-    stimuli: Sequence[str] = ()
+    model: str = ""
     project: Mapping[str, Any] = field(default_factory=dict)
 
     def build(self, folder: Path, width: int) -> GeneratedSystem:
         names = {str(block["type"]) for block in self.blocks if "type" in block}
         types = []
         for name in sorted(names):
-            text = _JOINING if name == "joining" else _ADDING.format(name=name, amount=name.removeprefix("add_"))
-            (folder / f"{name}.vhd").write_text(text)
-            inputs = [side(), side()] if name == "joining" else [side()]
+            (folder / f"{name}.vhd").write_text(source_of(name))
+            inputs = [side(), side()] if name in ("joining", "summing") else [side()]
             interface = {"input": inputs, "output": [side()]}
             types.append({"name": name, "type": "VHDL", "sources": f"{name}.vhd", "interface": interface})
         spec = {"project": {"name": "inner", "width": width, **self.project}, "accelerators": types}
         (folder / "inner.yaml").write_text(yaml.safe_dump({**spec, "blocks": list(self.blocks)}, sort_keys=False))
-        senders = self.stimuli or tuple(self.answers)
+        senders = tuple(self.answers)
         stimuli = [{senders[number % len(senders)]: {"data": 100 + number}} for number in range(COUNT)]
         (folder / "stimuli.yaml").write_text(yaml.safe_dump(stimuli))
         (folder / "model.py").write_text(
-            f"ANSWERS = {dict(self.answers)!r}\n\n\n"
+            self.model
+            or f"ANSWERS = {dict(self.answers)!r}\n\n\n"
             "def respond(subscriber, message):\n"
             "    return [(name, {'data': message['data'] + more}) for name, more in ANSWERS[subscriber].items()]\n"
         )
@@ -224,7 +268,54 @@ UNEQUAL = Case(
     ],
     {"one_in": {"one_out": 1, "done": 11}, "two_in": {"done": 15}},
 )
+# One reader takes nothing; its queue drops messages.
+STUCK = Case(
+    [
+        *ONE_TO_TWO.blocks[:3],
+        converter("stuck_in", "subscriber", "middle", "stuck", queue=2, overflow="drop_oldest"),
+        {"name": "stuck", "type": "stuck", "outgoing": [{"name": "never"}]},
+        converter("never", "publisher", "never"),
+        converter("right_in", "subscriber", "middle", "right"),
+        adding("right", 20, "right_out"),
+        converter("right_out", "publisher", "right"),
+    ],
+    {"raw": {"middle": 1, "right_out": 21}},
+)
+# Three clocks.
+CLOCKS = Case(
+    [
+        converter("raw", "subscriber", "raw", "first"),
+        adding("first", 1, "first_out", clock="fast"),
+        converter("first_out", "publisher", "a", deliver="fabric"),
+        converter("second_in", "subscriber", "a", "second", queue=2),
+        adding("second", 2, "second_out", clock="slow"),
+        converter("second_out", "publisher", "b"),
+        converter("third_in", "subscriber", "b", "third"),
+        adding("third", 4, "third_out", clock="fast"),
+        converter("third_out", "publisher", "c"),
+    ],
+    PIPELINE.answers,
+    project={
+        "clock": "100 MHz",
+        "clocks": [{"name": "fast", "frequency": "170 MHz"}, {"name": "slow", "frequency": "30 MHz"}],
+    },
+)
+# The sum is a topic that returns to its accelerator through a queue.
+FEEDBACK = Case(
+    [
+        converter("raw", "subscriber", "raw", "sum"),
+        {"name": "sum", "type": "summing", "outgoing": [{"name": "sum_out"}]},
+        converter("sum_out", "publisher", "total"),
+        converter("total_in", "subscriber", "total", "sum", queue=2),
+    ],
+    {"raw": {}},
+    "total = 0\n\n\ndef respond(_, message):\n    global total\n    total += message['data']\n"
+    "    return [('sum_out', {'data': total})]\n",
+)
 CASES = {
+    "a reader that takes nothing": STUCK,
+    "three clocks": CLOCKS,
+    "feedback": FEEDBACK,
     "1:2": ONE_TO_TWO,
     "2:1": TWO_TO_ONE,
     "2:2": TWO_TO_TWO,
@@ -248,6 +339,14 @@ def test_every_reader_answers_every_message(tmp_path: Path, case: str, width: in
     system = CASES[case].build(tmp_path, width)
     for seed, stalls in ((1, 0), (2, 25), (3, 70)):
         assert system.passes(SEED=seed, STALL_PERCENT=stalls)
+
+
+@pytest.mark.parametrize("width", [8, 64])
+def test_the_netlist_does_the_same_and_has_no_latch(tmp_path: Path, width: int) -> None:
+    system = TWO_TO_TWO.build(tmp_path, width)
+    assert system.work.latches(system.entity) == []
+    system.replace_by_netlist()
+    assert system.passes(SEED=4, STALL_PERCENT=30)
 
 
 @pytest.mark.parametrize("width", [8, 64])
@@ -279,3 +378,71 @@ def test_a_reader_hears_the_host_as_well(tmp_path: Path, width: int) -> None:
         (done,) = received(system).values()
         assert [number for number in done if number < 1000] == [*range(100, 100 + COUNT, 2)]
         assert [number for number in done if number > 1000] == [*range(1101, 1100 + COUNT, 2)]
+
+
+# --- messages of variable size ---------------------------------------------------------------------------------------
+
+TEXT = "std_msgs/String"
+# Texts from two subscribers, which meet at one reader or two. Two need buffers, since one text feeds both publishers.
+MEETING_TEXTS = [
+    converter("one", "subscriber", "one", "one_out", message=TEXT, maxLength=300),
+    converter("two", "subscriber", "two", "two_out", message=TEXT, maxLength=300),
+    converter("one_out", "publisher", "middle", message=TEXT, deliver="fabric"),
+    converter("two_out", "publisher", "middle", message=TEXT, deliver="fabric"),
+]
+
+
+def texts(folder: Path, width: int, readers: Sequence[str]) -> GeneratedSystem:
+    """A system without accelerators that returns texts."""
+    blocks = list(MEETING_TEXTS)
+    keys = {"buffer": 300} if len(readers) > 1 else {}
+    for name in readers:
+        blocks.append(converter(name, "subscriber", "middle", f"{name}_out", message=TEXT))
+        blocks.append(converter(f"{name}_out", "publisher", name, message=TEXT, **keys))
+    spec = {"project": {"name": "inner", "width": width}, "blocks": blocks}
+    (folder / "inner.yaml").write_text(yaml.safe_dump(spec, sort_keys=False))
+    (folder / "stimuli.yaml").write_text("- one: {data: first}\n")
+    (folder / "model.py").write_text("def respond(subscriber, message):\n    return []\n")
+    return build(call(folder / "inner.yaml", folder / "stimuli.yaml", folder / "model.py"), folder / "work")
+
+
+def text_frames(count: int, source: random.Random) -> tuple[list[bytes], set[int], dict[int, list[bytes]]]:
+    """Frames of texts for two subscribers in turn, those that are aborted, and the other payloads by subscriber."""
+    frames: list[bytes] = []
+    aborted: set[int] = set()
+    whole: dict[int, list[bytes]] = {0: [], 1: []}
+    for number in range(count):
+        text = f"{number} ".encode() + bytes(source.choices(b"abcdef", k=source.randint(1, 280)))
+        payload = bytes.fromhex("00010000") + (len(text) + 1).to_bytes(4, "little") + text + b"\0"
+        frame = pack_frame(number % 2, payload)
+        if source.random() < 0.3:
+            aborted.add(number)
+            frame = frame[: source.randint(2, len(frame))]
+        else:
+            whole[number % 2].append(payload)
+        frames.append(frame)
+    return frames, aborted, whole
+
+
+@pytest.mark.parametrize("readers", [["left"], ["left", "right"]])
+@pytest.mark.parametrize("width", [8, 64])
+def test_texts_meet_and_an_aborted_one_reaches_no_reader(tmp_path: Path, width: int, readers: Sequence[str]) -> None:
+    print(f"texts from seed {SEED}")
+    system = texts(tmp_path, width, readers)
+    frames, aborted, whole = text_frames(100, random.Random(SEED))
+    write_stimulus(system.folder / "stimulus.txt", frames, aborted)
+    (system.folder / "expected.txt").write_text("")
+    for stalls in (0, 40):
+        result = system.run(SEED=SEED, STALL_PERCENT=stalls, SHOWN=0)
+        found: dict[int, list[bytes]] = {}
+        for item in (system.folder / "received.txt").read_text().split("<")[1:]:
+            lines = [line for line in item.splitlines()[1:] if not line.startswith("!")]
+            # The publisher of an aborted text may have begun its frame.
+            if "! aborted" not in item:
+                frame = bytes.fromhex("".join(lines))
+                found.setdefault(frame[0], []).append(frame[5:])
+        assert len(found) == len(readers), result.output
+        for payloads in found.values():
+            assert sorted(payloads) == sorted([*whole[0], *whole[1]])
+            for own in whole.values():
+                assert [payload for payload in payloads if payload in own] == own
