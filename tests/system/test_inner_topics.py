@@ -215,6 +215,13 @@ def test_blocks_meet_at_an_input(tmp_path: Path) -> None:
     ]
 
 
+def test_a_reader_of_system_and_host_has_one_queue(tmp_path: Path) -> None:
+    system, _ = load(tmp_path, pair(", deliver: fabric", ", deliver: both, queue: 2, overflow: drop_newest"))
+    assert [item.queue for item in system.subscribers] == [None, None]
+    assert [(item.block, item.depth) for item in system.junctions] == [("second_in_merge", 0), ("second_in_queue", 2)]
+    assert ("second_in_merge", "second_in_queue/in_") in ways(system)
+
+
 def test_only_fields_with_a_reader_pass_a_merge(tmp_path: Path) -> None:
     """A publisher that is a reader's only sink takes one field."""
     lines = (

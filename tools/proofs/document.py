@@ -20,6 +20,7 @@ _SHORT = {
     "REQUESTERS": "N",
     "SOURCES": "N",
     "FRAMES": "F",
+    "MESSAGES": "F",
     "LIMIT": "L",
     "WATCHDOG": "L",
     "MAX_LENGTH": "M",

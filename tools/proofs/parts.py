@@ -59,6 +59,92 @@ _QUEUED = Proof(
     is_bounded=True,
 )
 
+_MERGE = "firm_message_merge.vhd"
+_TURN = "others_i /= NOTHING and (is_done = '1' or is_going = '0')"
+
+_MERGED = Proof(
+    "message_merge",
+    "firm_message_merge",
+    ("axis/package", "axis/axis"),
+    sizes=tuple({"SOURCES": count, "FIELD_BITS": 2, "OFFERS": 2, "TAKES": 2} for count in (2, 3, 4)),
+    depth=14,
+    mutations=(
+        Mutation(
+            _MERGE,
+            "(words(bits*source + place) and turn(source))",
+            "words(bits*source + place)",
+            ("comes_from_its_source",),
+        ),
+        Mutation(
+            _MERGE,
+            "sink_takes(place) and turn_r(source)",
+            "sink_takes(0) and turn_r(source)",
+            ("taken_as_the_sink_takes",),
+        ),
+        Mutation(_MERGE, "sink_takes(place) and turn_r(source)", "sink_takes(place)", ("takes_reach_only_it",)),
+        Mutation(_MERGE, _TURN, "others_i /= NOTHING", ("source_stays",)),
+        Mutation(_MERGE, _TURN, "others_i /= NOTHING and is_done = '1'", ("idle_for_one_cycle",)),
+        Mutation(_MERGE, _TURN, "others_i /= NOTHING and is_going = '0'", ("no_gap",)),
+        Mutation(
+            _MERGE,
+            "shift_left(resize(unsigned(turn_r), 2*SOURCES), 1)",
+            "to_unsigned(1, 2*SOURCES)",
+            ("after_at_most_all_others",),
+            1,
+        ),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
+_MESSAGES = "firm_message_queue.vhd"
+
+
+def _messages_size(messages: int, overflow: str) -> Size:
+    drops = {"DROP_OLDEST": overflow == "drop_oldest", "DROP_NEWEST": overflow == "drop_newest"}
+    return {"FIELD_BITS": 5, "MESSAGES": messages, **drops}
+
+
+_QUEUED_MESSAGES = Proof(
+    "message_queue",
+    "firm_message_queue",
+    ("axis/package", "axis/axis"),
+    sizes=(
+        _messages_size(3, "drop_oldest"),
+        _messages_size(3, "drop_newest"),
+        _messages_size(3, "block"),
+        _messages_size(1, "block"),
+    ),
+    depth=14,
+    mutations=(
+        Mutation(_MESSAGES, "may_load <= sink_ready or not valid_r;", "may_load <= '1';", ("valid_stays",)),
+        Mutation(_MESSAGES, "elsif may_load = '1' then", "else", ("payload_stays",)),
+        Mutation(_MESSAGES, "valid_r <= is_stored or enters;", "valid_r <= is_stored;", ("offered_if_held",)),
+        Mutation(_MESSAGES, "'1' when DROPS else not is_full;", "'1';", ("ready_if_room",), 2),
+        Mutation(
+            _MESSAGES,
+            "writes   <= enters and not (may_load and not is_stored);",
+            "writes   <= enters;",
+            ("in_order_once",),
+        ),
+        Mutation(
+            _MESSAGES,
+            "if reads = '1' or drops_i = '1' then",
+            "if reads = '1' then",
+            ("in_order_once",),
+        ),
+        Mutation(
+            _MESSAGES,
+            "fields_r <= memory(read_index_r);",
+            "fields_r <= memory(write_index_r);",
+            ("nothing_dropped",),
+            2,
+        ),
+    ),
+    trace=12,
+    is_bounded=True,
+)
+
 _WATCHED = Proof(
     "watchdog",
     "firm_axis_watchdog",
@@ -357,6 +443,8 @@ _READ = Proof(
 
 PROOFS = (
     _QUEUED,
+    _MERGED,
+    _QUEUED_MESSAGES,
     _WATCHED,
     _WATCHED_SINK,
     _REFUSED,

@@ -387,12 +387,17 @@ class _Meeting:
             for sink, frame in zip(connection.sinks, connection.frames, strict=True):
                 if sink.block not in self._removed:
                     self._link(_Source(connection.source, _names(frame)), sink)
-        blocks = {name: block for name, block in self.before.blocks.items() if name not in self._removed}
+        blocks = {name: self._kept(block) for name, block in self.before.blocks.items() if name not in self._removed}
         junctions = [self._with_length(item) for item in self.junctions.values()]
         topics = tuple(replace(item, wires=tuple(self.wires.get(item.name, ()))) for item in self.before.topics)
         after = replace(self.before, blocks=blocks, connections=self._connections(), topics=topics)
         self._warn_of_joins(after)
         return _with_junctions(after, junctions)
+
+    def _kept(self, block: Block) -> Block:
+        """Return a block that remains; the queue of a reader is after the merge with the host's messages."""
+        is_queued = ("queue", str(block.name)) in self.names and self.names["queue", str(block.name)] in self.junctions
+        return replace(block, queue=None, overflow=None) if is_queued else block
 
     def _warn_of_joins(self, after: Met) -> None:
         """Warn of messages that reach a block on two ways, if the shorter one is a topic without a queue."""
