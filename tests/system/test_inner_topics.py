@@ -6,9 +6,12 @@ import itertools
 import random
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
+from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.derived.connections import cycles_of
 from fusesoc_firm.system.derived.joins import joins
 from fusesoc_firm.system.derived.model import DerivedSystem, End
@@ -18,8 +21,11 @@ from fusesoc_firm.system.views.diagram import diagram
 from fusesoc_firm.system.views.inner_topics import topics_description, ways_of_topics
 from fusesoc_firm.system.views.show import counts
 from fusesoc_firm.text.diagnostics import InputError
+from tests.random_systems import RandomSystem, random_system
+from tests.seeds import seeded
 from tests.system.systems import LIBRARIES, accelerator, converter, derived, instance, specification
 
+SEED = seeded(20261130)
 PASSING = accelerator("passing", "Point", "Point")
 JOINING = accelerator("joining", "Point Point", "Point")
 
@@ -313,3 +319,58 @@ def test_ways_of_equal_lengths_join(tmp_path: Path) -> None:
     (join,) = joins(derived(tmp_path, specification(longer, PASSING + JOINING)).connections)
     assert (join.sink, join.shorter) == (End("join", "in1_"), ("raw", "two", "join"))
     assert join.longer == ("raw", "zero", "one", "join")
+
+
+# --- any system -------------------------------------------------------------------------------------------------------
+
+
+def with_topics(made: RandomSystem, chance: random.Random) -> tuple[str, int]:
+    """The specification with topics in place of some connections, and their number."""
+    content = yaml.safe_load(made.text)
+    keys = {block["name"]: block for block in content["blocks"]}
+    frames = _messages(content)
+    added: list[dict[str, Any]] = []
+    for (block, message), sinks in made.sinks.items():
+        for way in keys[block]["outgoing"]:
+            others = [other for (name, other), ends in made.sinks.items() if name == block and way["name"] in ends]
+            if way["name"] in sinks and len(others) == 1 and chance.random() < 0.4:
+                number = len(added) // 2
+                side = {**frames[str(message)], "topic": f"t{number}"}
+                added.append({"name": f"t{number}_out", **side, "mode": "publisher", "deliver": "fabric"})
+                outgoing = [dict(way)]
+                added.append({"name": f"t{number}_in", **side, "mode": "subscriber", "outgoing": outgoing})
+                way["name"] = f"t{number}_out"
+    content["blocks"] = [*content["blocks"], *added]
+    return yaml.safe_dump(content, sort_keys=False, width=1000), len(added) // 2
+
+
+def _messages(content: Any) -> dict[str, dict[str, str]]:
+    """The keys of each message, by its name."""
+    interfaces = [item["interface"] for item in content.get("accelerators", ())]
+    sides = [side for item in interfaces for side in (*item["input"], *item["output"])]
+    found = [*sides, *(block for block in content["blocks"] if "message" in block)]
+    return {item["message"]: {"middleware": item["middleware"], "message": item["message"]} for item in found}
+
+
+def flow(system: DerivedSystem) -> set[tuple[End, End, Frame]]:
+    return {
+        (item.source, sink, frame)
+        for item in system.connections
+        for sink, frame in zip(item.sinks, item.frames, strict=True)
+    }
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_a_topic_within_the_fpga_is_a_connection(number: int, tmp_path: Path) -> None:
+    print(f"seed {SEED + number}")
+    chance = random.Random(SEED + number)
+    made = random_system(chance, 5 + 2 * number, 3 + number // 2)
+    text, count = with_topics(made, chance)
+    systems = []
+    for name, content in (("plain.yaml", made.text), ("topics.yaml", text)):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        systems.append(load_system(tmp_path / name, LIBRARIES, needs_sources=False).system)
+    plain, topics = systems
+    assert len(topics.inner_topics) == count > 0
+    assert flow(topics) == flow(plain)
+    assert (topics.subscribers, topics.publishers) == (plain.subscribers, plain.publishers)

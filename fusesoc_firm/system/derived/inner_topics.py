@@ -345,10 +345,16 @@ class _Meeting:
             )
 
     def _check_fields(self, topic: InnerTopic, reader: str) -> None:
+        """Note fields that a publisher does not provide; a publisher behind a reader sends defaults for them.
+
+        Where messages of several sources meet, all of them have the same fields.
+        """
         needed = self._needs(reader)
+        has_merge = len(topic.publishers) > 1 or reader in topic.from_host
+        required = needed if has_merge else self._needs(reader, only_accelerators=True)
         for publisher in topic.publishers:
-            given = frozenset[Names]().union(*(source.names for source in self._feeds(publisher)))
-            if missing := sorted(needed - given):
+            given = self._given(publisher)
+            if missing := sorted(required - given if needed & given else needed):
                 self.faults.error(
                     f"'{publisher}' has no source for {', '.join(map(dotted, missing))}, which blocks take from"
                     f" '{reader}'",
@@ -420,8 +426,7 @@ class _Meeting:
         """Make the junctions of a topic, and note for each reader behind one the output from which it receives."""
         outlet = None
         if len(topic.publishers) > 1:
-            needs = frozenset[Names]().union(*map(self._needs, topic.readers))
-            junction = self._junction(self.names["topic", number], topic, needs)
+            junction = self._junction(self.names["topic", number], topic, topic.readers)
             outlet = self._make(replace(junction, sources=len(topic.publishers)))
         for reader in topic.readers:
             if found := self._make_outlet(topic, reader, outlet):
@@ -429,16 +434,19 @@ class _Meeting:
 
     def _make_outlet(self, topic: InnerTopic, reader: str, outlet: _Source | None) -> _Source | None:
         """Make the junctions of a reader after `outlet`, and return its output."""
-        block, needs = self.before.blocks[reader], self._needs(reader)
+        block = self.before.blocks[reader]
         if reader in topic.from_host:
-            outlet = self._make(replace(self._junction(self.names["merge", reader], topic, needs), sources=2))
+            outlet = self._make(replace(self._junction(self.names["merge", reader], topic, [reader]), sources=2))
         frame = self.before.outputs[reader][0].frame
         if frame.is_fixed_size and (depth := _depth_of(block)):
-            junction = self._junction(self.names["queue", reader], topic, needs)
+            junction = self._junction(self.names["queue", reader], topic, [reader])
             outlet = self._make(replace(junction, depth=depth, overflow=Overflow(str(block.overflow or BLOCK))))
         return outlet
 
-    def _junction(self, name: str, topic: InnerTopic, names: frozenset[Names]) -> Junction:
+    def _junction(self, name: str, topic: InnerTopic, readers: Sequence[str]) -> Junction:
+        """Return a junction for the fields that blocks take from the readers, if the publishers provide them."""
+        needed = frozenset[Names]().union(*map(self._needs, readers))
+        names = needed.intersection(*map(self._given, topic.publishers))
         frame = self.before.outputs[topic.readers[0]][0].frame
         return Junction(name, with_names_in_use(select(frame), names), topic.name)
 
@@ -474,10 +482,29 @@ class _Meeting:
 
     # --- sources ---------------------------------------------------------------------------------------------------
 
-    def _needs(self, reader: str) -> frozenset[Names]:
-        """Return the fields that blocks take from a reader."""
-        frames = (frame for item in self.before.connections if item.source.block == reader for frame in item.frames)
-        return frozenset[Names]().union(*map(_names, frames))
+    def _needs(self, reader: str, *, only_accelerators: bool = False) -> frozenset[Names]:
+        """Return the fields that blocks, or only accelerators and junctions, take from a reader."""
+        return frozenset[Names]().union(
+            *(
+                _names(frame)
+                for item in self.before.connections
+                if item.source.block == reader
+                for sink, frame in zip(item.sinks, item.frames, strict=True)
+                if not only_accelerators or self.before.blocks[sink.block].type is not None
+            )
+        )
+
+    def _given(self, publisher: str, behind: frozenset[str] = frozenset()) -> frozenset[Names]:
+        """Return the fields that a publisher's sources provide; the topics of `behind` are already on the way."""
+        found: set[Names] = set()
+        for source in self._feeds(publisher):
+            topic = self._topic_of.get(source.end.block)
+            if topic is None or topic.name in behind:
+                found |= source.names
+            else:
+                given = (self._given(item, behind | {topic.name}) for item in topic.publishers)
+                found |= source.names.intersection(*given)
+        return frozenset(found)
 
     def _feeds(self, publisher: str) -> list[_Source]:
         """Return the sources of a publisher's message."""
