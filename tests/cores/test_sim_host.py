@@ -285,6 +285,11 @@ def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, sti
         ("< @x a\n  00 00000000\n", "expected.txt:1: '@' must be followed by the number of a stimulus frame"),
         ("< a\n  .. 00000000\n", "expected.txt:2: '..' is legal only in an expected frame, after the id"),
         *((line, f"expected.txt:1: {ANNOUNCEMENTS}") for line in ("! id_errors 1\n", "! id_error -1\n")),
+        ("! way 1\n", "expected.txt:1: '! way' must follow a frame"),
+        *(
+            (f"< a\n  00 00000000\n! way {way}\n", "expected.txt:3: '! way' must be followed by a number from 1 to 63")
+            for way in ("0", "64", "x")
+        ),
         ("! aborted 1 10\n", "expected.txt:1: '! aborted' must follow a frame"),
         ("< a\n! aborted 1 10\n", "expected.txt:2: the frame before this line has no bytes"),
         *((f"< a\n  07\n! aborted {line}\n", f"expected.txt:3: {ABORTED}") for line in ("6 10", "7 9", "7", "7 x")),
@@ -318,3 +323,33 @@ def test_illegal_generics_are_named(host: Bench, tmp_path: Path, generic: str, v
     result = host.run(tmp_path, **{generic: value})
     assert result.exit_code != 0
     assert f"firm_sim_host: {generic} is {value}; legal: " in result.output
+
+
+# Two ways to the publisher 3, in turn.
+WAYS = "".join(
+    f"< @{number} {number}\n  03 02000000 {way}{number:02x}\n! way {way}\n"
+    for number, way in ((0, 17), (1, 34), (2, 17), (3, 34), (4, 17))
+)
+
+
+@pytest.mark.parametrize(
+    ("order", "fault"),
+    [
+        ((0, 1, 2, 3, 4), ""),
+        ((1, 0, 3, 2, 4), ""),
+        ((0, 2, 4, 1, 3), ""),
+        ((1, 3, 0, 2, 4), ""),
+        ((2, 0, 1, 3, 4), "byte 6: expected 00, got 02"),
+        ((0, 3, 1, 2, 4), "byte 6: expected 01, got 03"),
+        ((0, 1, 2, 3, 3), "byte 5: expected "),
+    ],
+)
+def test_frames_of_several_ways_come_in_any_order(
+    host: Bench, tmp_path: Path, order: tuple[int, ...], fault: str
+) -> None:
+    """But in order on each way; the bench returns what it is sent."""
+    frames = {number: f"03 02000000 {34 if number % 2 else 17}{number:02x}" for number in range(5)}
+    stimulus = "".join(f"> {number}\n  {frames[number]}\n" for number in order)
+    result = _run(host, tmp_path, stimulus, WAYS, STALL_PERCENT=20)
+    assert (result.exit_code == 0) is not bool(fault), result.output
+    assert fault in result.output

@@ -68,6 +68,9 @@ module firm_sim_host #(
   localparam ABORTED      = 10;          // the code of aborted frames
   localparam LINE_BYTES   = 64;
   localparam NAME_BITS    = 8 * 1024;
+  localparam MOST_WAYS    = 63;
+  localparam WAYS_LOOKED_AT = 1000;      // frames among which the next one of another way is looked for
+  localparam KEPT         = 65536;       // the bytes of a frame that may have come another way
 
   localparam NONE     = -1;
   localparam STIMULUS = 0;       // where the frames of the two files begin in the tables
@@ -91,6 +94,7 @@ module firm_sim_host #(
   integer last_cycle  [0:FRAMES-1];
   reg     is_aborted  [0:2*FRAMES-1];
   reg     is_received [0:2*FRAMES-1];
+  integer way         [0:2*FRAMES-1];  // frames with one id and different ways may come in any order; 0: in the file's
   integer first_of_id [0:255];         // the next expected one
   integer last_of_id  [0:255];
   integer stimuli, expectations;       // frames of the files
@@ -112,6 +116,7 @@ module firm_sim_host #(
   reg     is_in_frame, is_frame_right;
   integer received_id;
   integer bytes_received;
+  reg [7:0] bytes_kept [0:KEPT-1];
   integer first_out, last_out;
   reg     is_accepting;
   integer frames_received, frames_right, frames_shown;
@@ -203,6 +208,7 @@ module firm_sim_host #(
       next_of_id[frame]  = NONE;
       is_aborted[frame]  = 0;
       is_received[frame] = 0;
+      way[frame]         = 0;
       header_masks       = 0;
       if (char >= 0 && char != BLANK && char != NEWLINE && char != RETURN) begin
         begin_form_fault;
@@ -254,7 +260,23 @@ module firm_sim_host #(
     end
   endtask
 
-  // The rest of `! id_error n`, `! frame_error n` or `! aborted id code`.
+  // `! way n`: the last frame comes in the order of the frames with its id and way.
+  task set_way(input integer number);
+    begin
+      if (frame == NONE) begin
+        begin_form_fault;
+        $display("'! way' must follow a frame");
+        fail_form;
+      end else if (number < 1 || number > MOST_WAYS) begin
+        begin_form_fault;
+        $display("'! way' must be followed by a number from 1 to %0d", MOST_WAYS);
+        fail_form;
+      end
+      way[frame] = number;
+    end
+  endtask
+
+  // The rest of `! id_error n`, `! frame_error n`, `! way n` or `! aborted id code`.
   task announce_errors;
     reg [8*12-1:0] word;
     integer        pulses;
@@ -280,7 +302,9 @@ module firm_sim_host #(
         begin_form_fault;
         $display("expected '! aborted <id> <code>'");
         fail_form;
-      end else if (pulses >= 0 && word == "id_error")
+      end else if (word == "way")
+        set_way(pulses);
+      else if (pulses >= 0 && word == "id_error")
         announced_id_errors = pulses;
       else if (pulses >= 0 && word == "frame_error")
         announced_frame_errors = pulses;
@@ -660,7 +684,62 @@ module firm_sim_host #(
     end
   endtask
 
+  // Whether a frame has all bytes that have been received, and `got` after them; `file` is then after these.
+  task check_like(input integer other, input [7:0] got, output reg is_like);
+    integer place, ignored;
+    begin
+      is_like = !is_aborted[other] && size[other] > bytes_received && bytes_received < KEPT;
+      ignored = $fseek(expected_file, bytes_at[other], 0);
+      for (place = 0; place <= bytes_received && is_like; place = place + 1) begin
+        file = expected_file;
+        next_byte;
+        is_like = value == ANY || value[7:0] === (place == bytes_received ? got : bytes_kept[place]);
+      end
+    end
+  endtask
+
+  // The frame that is received in place of the expected one, if it is the next one of another way.
+  task try_ways(input [7:0] got, output reg is_found);
+    reg [MOST_WAYS:0] seen;
+    integer           other, before, looked, origin, ignored;
+    reg               fits;
+    begin
+      origin   = $ftell(expected_file);
+      is_found = 0;
+      seen     = 0;
+      seen[way[receiving]] = 1;
+      other    = first_of_id[received_id];
+      before   = NONE;
+      for (looked = 0; looked < WAYS_LOOKED_AT && other != NONE && !is_found; looked = looked + 1) begin
+        fits = 0;
+        if (!seen[way[other]]) begin
+          seen[way[other]] = 1;
+          check_like(other, got, fits);
+        end
+        if (fits) begin
+          if (before == NONE)
+            first_of_id[received_id] = next_of_id[other];
+          else
+            next_of_id[before] = next_of_id[other];
+          next_of_id[receiving]    = first_of_id[received_id];
+          is_received[receiving]   = 0;
+          first_of_id[received_id] = receiving;
+          is_received[other]       = 1;
+          receiving                = other;
+          is_found                 = 1;
+        end else begin
+          before = other;
+          other  = next_of_id[other];
+        end
+      end
+      if (!is_found)
+        ignored = $fseek(expected_file, origin, 0);
+    end
+  endtask
+
   task receive_byte(input [7:0] got);
+    reg     is_found;
+    integer wanted;
     begin
       if (received_file != 0) begin
         if (bytes_received % LINE_BYTES == 0)
@@ -674,12 +753,18 @@ module firm_sim_host #(
           idle_cycles = 0;
           file        = expected_file;
           next_byte;
-          if (value != ANY && got !== value[7:0]) begin
+          wanted   = value;
+          is_found = 0;
+          if (wanted != ANY && got !== wanted[7:0] && is_frame_right && way[receiving] > 0)
+            try_ways(got, is_found);
+          if (wanted != ANY && got !== wanted[7:0] && !is_found) begin
             begin_frame_fault;
             if (is_shown)
-              $display("byte %0d: expected %c%c, got %c%c", bytes_received, digit(value[7:4]), digit(value[3:0]),
+              $display("byte %0d: expected %c%c, got %c%c", bytes_received, digit(wanted[7:4]), digit(wanted[3:0]),
                        digit(got[7:4]), digit(got[3:0]));
           end
+          if (bytes_received < KEPT)
+            bytes_kept[bytes_received] = got;
         end else if (bytes_received == size[receiving]) begin
           begin_frame_fault;
           if (is_shown)

@@ -152,6 +152,7 @@ begin
     variable is_frame_right  : boolean;
     variable received_id     : integer := NO_ID;
     variable bytes_received  : natural := 0;
+    variable bytes_kept      : line;         -- those of the incoming frame, if it may have come another way
     variable first_out       : natural;
     variable is_accepting    : boolean := false;
     variable frames_received : natural := 0;  -- expected ones
@@ -352,16 +353,12 @@ begin
     end procedure begin_frame;
 
     procedure compare_byte(value : in byte_t) is
-      variable wanted : byte_t;
+      constant WANTED   : byte_t := to_byte(receiving.bytes(bytes_received+1));
+      variable is_right : boolean;
     begin
-      if receiving.any_byte /= null then
-        if receiving.any_byte(bytes_received+1) = '.' then
-          return;
-        end if;
-      end if;
-      wanted := to_byte(receiving.bytes(bytes_received+1));
-      if value /= wanted then
-        frame_fault("byte " & integer'image(bytes_received) & ": expected " & to_hex(wanted) & ", got "
+      compare(expected, received_id, receiving, bytes_kept, bytes_received, value, is_frame_right, is_right);
+      if not is_right then
+        frame_fault("byte " & integer'image(bytes_received) & ": expected " & to_hex(WANTED) & ", got "
           & to_hex(value));
       end if;
     end procedure compare_byte;

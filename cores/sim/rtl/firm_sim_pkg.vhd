@@ -30,10 +30,13 @@ package firm_sim_pkg is
     first_cycle : natural;      -- the host notes when the first and the last beat of a stimulus frame were taken
     last_cycle  : natural;
     is_aborted  : boolean;      -- its last beat aborts it
+    way         : natural;      -- frames with one id and different ways may come in any order; 0: in that of the file
     is_received : boolean;      -- set by the host
     next_frame  : frame_ptr_t;  -- in the order of the file
     next_of_id  : frame_ptr_t;  -- the next one with the same id
   end record frame_t;
+
+  constant MOST_WAYS : positive := 63;
 
   type frame_per_id_t is array (0 to 65535) of frame_ptr_t;
 
@@ -85,12 +88,28 @@ package firm_sim_pkg is
   -- Frame `number`, counted from 0, in the order of the file; null if there are fewer.
   procedure find_frame(content : inout frame_file_t; number : in natural; frame : out frame_ptr_t);
 
+  -- Compares byte `count` of a frame with this `id`, counted from 0, and keeps it if the frame has a way. If it differs
+  -- and `may_change`, the next frame of another way that begins with all bytes so far takes the place of `frame`.
+  procedure compare(
+    content    : inout frame_file_t;
+    id         : in    natural;
+    frame      : inout frame_ptr_t;
+    kept       : inout line;
+    count      : in    natural;
+    value      : in    byte_t;
+    may_change : in    boolean;
+    is_right   : out   boolean
+  );
+
 end package firm_sim_pkg;
 
 package body firm_sim_pkg is
 
   constant HEX_DIGITS   : string(1 to 16) := "0123456789abcdef";
   constant LENGTH_BYTES : positive        := 4;
+
+  -- Frames among which the next one of another way is looked for.
+  constant WAYS_LOOKED_AT : positive := 1000;
 
   type byte_table_t is array (character) of byte_t;
 
@@ -412,10 +431,23 @@ package body firm_sim_pkg is
     content.last.is_aborted := true;
   end procedure abort_frame;
 
+  -- `! way n`: the last frame comes in the order of the frames with its id and way.
+  procedure set_way(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
+    constant WAY : integer := parse_number(text, 7);
+  begin
+    if content.last = null then
+      fail_at(path, line_number, "'! way' must follow a frame");
+    elsif WAY < 1 or WAY > MOST_WAYS then
+      fail_at(path, line_number, "'! way' must be followed by a number from 1 to " & integer'image(MOST_WAYS));
+    end if;
+    content.last.way := WAY;
+  end procedure set_way;
+
   -- A line that starts with '!'.
   procedure read_announcement(path : in string; line_number : in natural; mark : in character; text : in string;
     content : inout frame_file_t) is
     constant ABORTED : string := "! aborted ";
+    constant WAY     : string := "! way ";
   begin
     if text'length > ABORTED'length then
       if text(ABORTED'range) = ABORTED then
@@ -425,6 +457,12 @@ package body firm_sim_pkg is
     end if;
     if mark /= '<' then
       fail_at(path, line_number, "expected '! aborted <id> <code>'");
+    end if;
+    if text'length > WAY'length then
+      if text(WAY'range) = WAY then
+        set_way(path, line_number, text, content);
+        return;
+      end if;
     end if;
     announce_errors(path, line_number, text, content);
   end procedure read_announcement;
@@ -541,5 +579,95 @@ package body firm_sim_pkg is
     end loop;
     frame := found;
   end procedure find_frame;
+
+  -- Whether byte `place`, counted from 1, of a frame may have a value.
+  procedure check_byte(frame : inout frame_t; place : in positive; value : in byte_t; is_like : out boolean) is
+  begin
+    is_like := to_byte(frame.bytes(place)) = value;
+    if frame.any_byte /= null then
+      is_like := frame.any_byte(place) = '.' or to_byte(frame.bytes(place)) = value;
+    end if;
+  end procedure check_byte;
+
+  procedure check_begin(frame : inout frame_t; kept : inout line; count : in natural; value : in byte_t;
+    is_like : out boolean) is
+    variable fits : boolean := not frame.is_aborted and frame.size > count;
+  begin
+    if fits then
+      check_byte(frame, count + 1, value, fits);
+    end if;
+    for place in count downto 1 loop
+      exit when not fits;
+      check_byte(frame, place, to_byte(kept(place)), fits);
+    end loop;
+    is_like := fits;
+  end procedure check_begin;
+
+  -- `receiving` is the next frame with its `id` again if another one takes its place.
+  procedure take_another_way(
+    content   : inout frame_file_t;
+    id        : in    natural;
+    receiving : inout frame_ptr_t;
+    kept      : inout line;
+    count     : in    natural;
+    value     : in    byte_t;
+    is_found  : out   boolean
+  ) is
+    type seen_t is array (0 to MOST_WAYS) of boolean;
+    variable seen   : seen_t := (others => false);
+    variable frame  : frame_ptr_t := content.first_of_id(id);
+    variable before : frame_ptr_t;
+    variable fits   : boolean;
+  begin
+    is_found            := false;
+    seen(receiving.way) := true;
+    for looked in 1 to WAYS_LOOKED_AT loop
+      exit when frame = null;
+      fits := false;
+      if not seen(frame.way) then
+        seen(frame.way) := true;
+        check_begin(frame.all, kept, count, value, fits);
+      end if;
+      if fits then
+        if before = null then
+          content.first_of_id(id) := frame.next_of_id;
+        else
+          before.next_of_id := frame.next_of_id;
+        end if;
+        receiving.next_of_id    := content.first_of_id(id);
+        receiving.is_received   := false;
+        content.first_of_id(id) := receiving;
+        frame.is_received       := true;
+        receiving               := frame;
+        is_found                := true;
+        return;
+      end if;
+      before := frame;
+      frame  := frame.next_of_id;
+    end loop;
+  end procedure take_another_way;
+
+  procedure compare(
+    content    : inout frame_file_t;
+    id         : in    natural;
+    frame      : inout frame_ptr_t;
+    kept       : inout line;
+    count      : in    natural;
+    value      : in    byte_t;
+    may_change : in    boolean;
+    is_right   : out   boolean
+  ) is
+    variable fits : boolean;
+  begin
+    check_byte(frame.all, count + 1, value, fits);
+    if not fits and may_change and frame.way > 0 then
+      take_another_way(content, id, frame, kept, count, value, fits);
+    end if;
+    if frame.way > 0 and is_defined(value) then
+      make_room(kept, count, count + 1);
+      kept(count+1) := to_character(value);
+    end if;
+    is_right := fits;
+  end procedure compare;
 
 end package body firm_sim_pkg;

@@ -7,7 +7,7 @@ wrong bytes become wrong fields with their values.
 from __future__ import annotations
 
 import re
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,6 +26,8 @@ _WRONG_BYTE = re.compile(
 )
 _MORE = re.compile(r"and (\d+) more faults")
 _MOST_FIELDS = 10
+# The frames among which the simulated host looks for the next one of another way.
+_WAYS_LOOKED_AT = 1000
 # Longer values are not shown, since their difference might be beyond the end of a line.
 _LONGEST = 80
 
@@ -134,18 +136,58 @@ def read_answers(
     id_digits, first = 2 * id_bytes, 2 * (id_bytes + LENGTH_BYTES)
     sinks = {item.id.to_bytes(id_bytes, "little").hex(): item for item in publishers}
     sent = _sent(stimuli, subscribers, id_bytes)
-    waiting: dict[str, deque[tuple[str, str]]] = defaultdict(deque)
-    for label, digits in expected:
-        waiting[digits[:id_digits]].append((label, digits[first:]))
+    waiting: dict[str, list[_Wanted]] = defaultdict(list)
+    for (label, digits), way in zip(expected, _ways(paths[1].read_text(encoding="ascii")), strict=True):
+        waiting[digits[:id_digits]].append(_Wanted(label, digits[first:], way))
+    for queue in waiting.values():
+        queue.reverse()
     answers = []
     for _, digits in received:
         queue, topic = waiting[digits[:id_digits]], sinks.get(digits[:id_digits])
         if queue and topic:
-            label, wanted = queue.popleft()
+            found = queue.pop(_place(queue, digits[first:]))
+            label, wanted = found.label, found.digits
             cause, name = _parts(label)
             pair = Payload(topic, wanted), Payload(topic, _masked(digits[first:], wanted))
             answers.append(Answer(name, cause, None if cause is None else sent[cause], *pair))
     return answers
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """An expected frame: its label, the digits of its payload, and its way, 0 for the order of the file."""
+
+    label: str
+    digits: str
+    way: int
+
+
+def _ways(expected: str) -> list[int]:
+    """Return the way of each frame in a file of expected frames."""
+    found: list[int] = []
+    for line in expected.splitlines():
+        if line.startswith("<"):
+            found.append(0)
+        elif line.startswith("! way "):
+            found[-1] = int(line.removeprefix("! way "))
+    return found
+
+
+def _place(queue: Sequence[_Wanted], digits: str) -> int:
+    """Return the place of the frame that a received one is compared with, in a queue whose next frame is the last.
+
+    It is the next frame, or the next one of another way if this one is equal.
+    """
+    last = len(queue) - 1
+    seen: set[int] = set()
+    for place in range(last, max(-1, last - _WAYS_LOOKED_AT), -1):
+        wanted = queue[place]
+        if not queue[last].way:
+            break
+        if wanted.way not in seen and _masked(digits, wanted.digits) == wanted.digits:
+            return place
+        seen.add(wanted.way)
+    return last
 
 
 def software_answers(folder: Path, system: DerivedSystem) -> dict[int, list[Answer]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice, takewhile
 from typing import Any
 
@@ -30,16 +30,25 @@ def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter],
     return "\n".join(lines) + "\n"
 
 
-def expected_text(responses: Iterable[Response], publishers: Iterable[Converter], id_bytes: int = ID_BYTES) -> str:
-    """Return the text of the file of expected frames, in which padding matches any byte."""
+def expected_text(
+    responses: Sequence[Response],
+    publishers: Iterable[Converter],
+    id_bytes: int = ID_BYTES,
+    ways: Sequence[int] = (),
+) -> str:
+    """Return the text of the file of expected frames, in which padding matches any byte.
+
+    Responses with different `ways`, unless they are 0, may come in any order.
+    """
     ids = {item.block: item.id for item in publishers}
     lines: list[str] = []
-    for response in responses:
+    for response, way in zip(responses, ways or [0] * len(responses), strict=True):
         publisher = response.publisher
         cause = "" if response.cause is None else f"@{response.cause} "
         lines.append(f"< {cause}{_label(publisher, response.message)}")
         used = b"\1" * (id_bytes + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
         lines += hex_lines(pack_frame(ids[publisher.block], response.payload, id_bytes), used)
+        lines += [f"! way {way}"] if way else []
     return "\n".join(lines) + "\n"
 
 

@@ -27,6 +27,7 @@ from fusesoc_firm.runs.simulation.software_run import (
     traffic,
 )
 from fusesoc_firm.runs.simulation.stimuli import Stimulus
+from fusesoc_firm.runs.simulation.ways import ways_of
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem, NetworkKind
 from fusesoc_firm.system.hardware.configuration import (
@@ -93,9 +94,11 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     else:
         frames = max(len(found.stimuli), len(found.responses))
         files |= _verilog_bench(configuration, system, frames, _beats(found.responses, system.width))
+    ways = ways_of(found.responses, found.stimuli, system)
+    expected = expected_text(found.responses, system.publishers, system.id_bytes, ways)
     files |= {
         "stimulus.txt": _host_file("stimulus.txt", stimulus_text(found.stimuli, system.subscribers, system.id_bytes)),
-        "expected.txt": _host_file("expected.txt", expected_text(found.responses, system.publishers, system.id_bytes)),
+        "expected.txt": _host_file("expected.txt", expected),
     }
     if found.published:
         files[SOFTWARE_FILE] = _host_file(SOFTWARE_FILE, software_text(found.published))
