@@ -276,6 +276,41 @@ def test_two_ways_to_one_block_are_warned_of(tmp_path: Path, queue: str, count: 
     assert warnings == ["messages take two ways: first -> join and first -> between -> join"][:count]
 
 
+def test_a_join_behind_a_merge_is_warned_of(tmp_path: Path) -> None:
+    """The merge may forward a message of the other block, so that the join waits for ever."""
+    lines = (
+        converter("raw", "subscriber", "Point", "one", "two")
+        + instance("one", "passing", "merged")
+        + instance("two", "passing", "merged", "join")
+        + instance("merged", "passing", "join")
+        + instance("join", "joining", "done")
+        + converter("done", "publisher", "Point")
+    )
+    _, warnings = load(tmp_path, lines, PASSING + JOINING)
+    assert warnings == ["messages take two ways: two -> join and two -> merged_in_merge -> merged -> join"]
+
+
+def test_a_publisher_beside_a_merge_of_texts_has_a_buffer(tmp_path: Path) -> None:
+    """Otherwise, it would hold the Manager while its stream waits for its turn."""
+    text = "std_msgs/String"
+    lines = (
+        converter("one", "subscriber", text, "one_out")
+        + converter("two", "subscriber", text, "two_out")
+        + on("t", converter("one_out", "publisher", text), ", buffer: 50")
+        + on("t", converter("two_out", "publisher", text), ", deliver: fabric")
+        + on("t", converter("reader", "subscriber", text, "counting"))
+        + instance("counting", "counting", "done")
+        + converter("done", "publisher", "Point")
+    )
+    types = accelerator("counting", text, "Point")
+    system, _ = load(tmp_path, lines, types)
+    assert [item.buffer for item in system.publishers] == [50, 0]
+    with pytest.raises(
+        InputError, match=r"'one_out' needs a 'buffer': its streams also wait where the message of 'one'"
+    ):
+        load(tmp_path, lines.replace(", buffer: 50", ""), types)
+
+
 def test_a_relative_name_meets_no_absolute_one(tmp_path: Path) -> None:
     """A node in a namespace has two topics."""
     lines = pair().replace("topic: middle, ", "topic: middle, ").replace("topic: middle}", "topic: /middle}", 1)

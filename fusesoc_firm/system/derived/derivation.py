@@ -31,6 +31,7 @@ from fusesoc_firm.system.derived.queue import queue_of
 from fusesoc_firm.system.derived.resolution import Libraries, Resolved, resolve
 from fusesoc_firm.system.derived.services import services_of
 from fusesoc_firm.system.derived.status import has_time_stamps, status_of
+from fusesoc_firm.system.derived.streams import check_streams
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import check_topics
 from fusesoc_firm.system.derived.tree import tree_of
@@ -133,6 +134,7 @@ def _data_flow(resolved: Resolved, faults: Diagnostics) -> _Flow:
     services = services_of(blocks, parts, faults)
     actions = actions_of(blocks, parts, faults)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
+    check_streams(connections, met.merges, parts.blocks, faults)
     return _Flow(names, parts, connections, services, actions, met)
 
 
@@ -144,7 +146,7 @@ def _converters(
     Raise `InputError` if the buffers have faults, since payloads then have no known length.
     """
     parts = flow.parts
-    buffers = publisher_buffers(flow.connections, parts.of_mode(PUBLISHER), faults)
+    buffers = publisher_buffers(flow.connections, parts.of_mode(PUBLISHER), flow.met.merges, faults)
     faults.raise_if_any()
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _of_mode(PUBLISHER, parts, flow.connections)

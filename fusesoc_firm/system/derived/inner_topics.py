@@ -57,6 +57,11 @@ class Met:
     junctions: tuple[Junction, ...] = ()
     topics: tuple[InnerTopic, ...] = ()
 
+    @property
+    def merges(self) -> frozenset[str]:
+        """The blocks at which messages of several sources meet."""
+        return frozenset(item.block for item in self.junctions if item.sources > 1)
+
 
 def meet(
     before: Met, uses: Iterable[TopicUse], merged: Collection[End], software: Collection[str], faults: Diagnostics
@@ -406,18 +411,22 @@ class _Meeting:
         return replace(block, queue=None, overflow=None) if is_queued else block
 
     def _warn_of_joins(self, after: Met) -> None:
-        """Warn of messages that reach a block on two ways, if the shorter one is a topic without a queue."""
+        """Warn of messages that reach a block on two ways, if the shorter one is a topic without a queue.
+
+        With a merge on one of the ways, the other one may need a message that the merge does not forward yet.
+        """
         topics = {sink: topic for topic in after.topics for _, sink in topic.wires}
-        for join in joins(after.connections, self.junctions):
-            if topic := topics.get(join.sink):
+        merges = {item.block for item in self.junctions.values() if item.sources > 1}
+        for join in joins(after.connections, merges):
+            shorter, longer = (" -> ".join(way) for way in (join.shorter, join.longer))
+            message = f"messages take two ways: {shorter} and {longer}"
+            if join.has_merge:
+                place = self.before.blocks[join.shorter[-1]].name.source
+                self.faults.warn(message, place, f"'{join.shorter[-1]}' waits for ever if it needs both of one message")
+            elif topic := topics.get(join.sink):
                 reader = next(name for name in topic.readers if join.sink in self._sinks(name))
-                shorter, longer = (" -> ".join(way) for way in (join.shorter, join.longer))
-                self.faults.warn(
-                    f"messages take two ways: {shorter} and {longer}",
-                    self.before.blocks[reader].name.source,
-                    "they stop if a block between takes a further message before it answers; add 'queue' to"
-                    f" '{reader}'",
-                )
+                hint = "they stop if a block between takes a further message before it answers; add 'queue' to"
+                self.faults.warn(message, self.before.blocks[reader].name.source, f"{hint} '{reader}'")
 
     def _sinks(self, reader: str) -> set[End]:
         return {sink for item in self.before.connections if item.source.block == reader for sink in item.sinks}

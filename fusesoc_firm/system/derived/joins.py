@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations
 
 from fusesoc_firm.system.derived.model import Connection, End
 
@@ -19,17 +19,21 @@ Way = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Join:
-    """Two ways from one block to another, each with all its blocks; `sink` is the end of the shorter one."""
+    """Two ways from one block to another, each with all its blocks; `sink` is the end of the shorter one.
+
+    If the message meets others on one of the ways, `has_merge` is set.
+    """
 
     sink: End
     shorter: Way
     longer: Way
+    has_merge: bool = False
 
 
 def joins(connections: Iterable[Connection], merges: Collection[str] = ()) -> Iterator[Join]:
-    """Yield for each pair of inputs of a block the nearest block from which ways of different lengths lead to both.
+    """Yield for each pair of inputs of a block the nearest block from which ways lead to both.
 
-    `merges` are blocks that take the messages of their inputs one by one.
+    The ways have different lengths, or one of `merges` is on them, which takes the messages of its inputs one by one.
     """
     before: dict[End, list[str]] = {}
     inputs: dict[str, list[End]] = {}
@@ -42,9 +46,12 @@ def joins(connections: Iterable[Connection], merges: Collection[str] = ()) -> It
         if len(ends) < 2 or block in merges:
             continue
         ways = {end: _ways(block, before[end], inputs, before) for end in ends}
-        for one, other in permutations(ways, 2):
+        for one, other in combinations(ways, 2):
             if found := _nearest(ways[one], ways[other]):
-                yield Join(one, *found)
+                shorter, longer = sorted(found, key=len)
+                has_merge = not {*shorter, *longer}.isdisjoint(merges)
+                if len(shorter) < len(longer) or has_merge:
+                    yield Join(one if shorter == found[0] else other, shorter, longer, has_merge)
 
 
 def _ways(
@@ -63,7 +70,6 @@ def _ways(
 
 
 def _nearest(one: Mapping[str, Way], other: Mapping[str, Way]) -> tuple[Way, Way] | None:
-    """Return the shortest two ways from the same block, if the first one is shorter than the second one."""
+    """Return the shortest two ways from the same block."""
     common = [(one[name], other[name]) for name in one if name in other]
-    nearest = min(common, key=lambda ways: len(ways[0]) + len(ways[1]), default=None)
-    return nearest if nearest and len(nearest[0]) < len(nearest[1]) else None
+    return min(common, key=lambda ways: len(ways[0]) + len(ways[1]), default=None)

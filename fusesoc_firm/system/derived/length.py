@@ -7,7 +7,7 @@ buffers: only one publisher sends at a time, so without buffers the others would
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.frame.length import Length, Repeat, sent_length_of
@@ -113,10 +113,10 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
 
 
 def publisher_buffers(
-    connections: Sequence[Connection], publishers: Mapping[str, Block], faults: Diagnostics
+    connections: Sequence[Connection], publishers: Mapping[str, Block], merges: Collection[str], faults: Diagnostics
 ) -> dict[str, int]:
     """Return the buffer size, in bytes of payload, of each publisher that stores whole frames."""
-    needs = _needs(connections, publishers)
+    needs = _needs(connections, publishers, merges)
     buffers: dict[str, int] = {}
     for connection in connections:
         for end in connection.sinks:
@@ -155,14 +155,20 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
     return size
 
 
-def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -> dict[str, _Need]:
+def _needs(
+    connections: Sequence[Connection], publishers: Mapping[str, Block], merges: Collection[str]
+) -> dict[str, _Need]:
     """Return the publishers that must store their frames, each with the reason."""
     needs: dict[str, _Need] = {}
     for connection in connections:
         if connection.length is None:
             continue
         if len(connection.sinks) > 1:
-            waiting = [name for name in publishers if name in _blocks_behind(connection.sinks, connections)]
+            behind = blocks_behind(connection.sinks, connections)
+            waiting = [name for name in publishers if name in behind]
+            if len(waiting) == 1 and not behind.isdisjoint(merges):
+                reason = f"its streams also wait where the message of '{connection.source.block}' meets others"
+                needs = dict.fromkeys(waiting, _Need(reason, _ADD_BUFFER)) | needs
             if len(waiting) > 1:
                 names = ", ".join(f"'{name}'" for name in waiting)
                 reason = f"{names} wait for the same streams, but only one of them can send at a time"
@@ -176,14 +182,14 @@ def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -
     return needs
 
 
-def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> set[str]:
+def blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> set[str]:
     """Return all blocks that messages of variable size reach from `ends`, including `ends`."""
     found: set[str] = set()
     for end in ends:
         found.add(end.block)
         for connection in connections:
             if connection.source.block == end.block and connection.length is not None:
-                found |= _blocks_behind(connection.sinks, connections)
+                found |= blocks_behind(connection.sinks, connections)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -348,22 +348,20 @@ def test_the_netlist_does_the_same_and_has_no_latch(tmp_path: Path, width: int) 
 # --- messages of variable size ---------------------------------------------------------------------------------------
 
 TEXT = "std_msgs/String"
-# Texts from two subscribers, which meet at one reader or two. Two need buffers, since one text feeds both publishers.
-MEETING_TEXTS = [
-    converter("one", "subscriber", "one", "one_out", message=TEXT, maxLength=300),
-    converter("two", "subscriber", "two", "two_out", message=TEXT, maxLength=300),
-    converter("one_out", "publisher", "middle", message=TEXT, deliver="fabric"),
-    converter("two_out", "publisher", "middle", message=TEXT, deliver="fabric"),
-]
 
 
-def texts(folder: Path, width: int, readers: Sequence[str]) -> GeneratedSystem:
-    """A system without accelerators that returns texts."""
-    blocks = list(MEETING_TEXTS)
-    keys = {"buffer": 300} if len(readers) > 1 else {}
+def texts(folder: Path, width: int, readers: Sequence[str], **keys: Any) -> GeneratedSystem:
+    """A system without accelerators that returns texts; `keys` are those of the publishers that meet."""
+    blocks = [
+        converter("one", "subscriber", "one", "one_out", message=TEXT, maxLength=300),
+        converter("two", "subscriber", "two", "two_out", message=TEXT, maxLength=300),
+        converter("one_out", "publisher", "middle", message=TEXT, **keys),
+        converter("two_out", "publisher", "middle", message=TEXT, **keys),
+    ]
+    buffer = {"buffer": 300} if len(readers) > 1 or "buffer" in keys else {}
     for name in readers:
         blocks.append(converter(name, "subscriber", "middle", f"{name}_out", message=TEXT))
-        blocks.append(converter(f"{name}_out", "publisher", name, message=TEXT, **keys))
+        blocks.append(converter(f"{name}_out", "publisher", name, message=TEXT, **buffer))
     spec = {"project": {"name": "inner", "width": width}, "blocks": blocks}
     (folder / "inner.yaml").write_text(yaml.safe_dump(spec, sort_keys=False))
     (folder / "stimuli.yaml").write_text("- one: {data: first}\n")
@@ -393,21 +391,39 @@ def text_frames(count: int, source: random.Random) -> tuple[list[bytes], set[int
 @pytest.mark.parametrize("width", [8, 64])
 def test_texts_meet_and_an_aborted_one_reaches_no_reader(tmp_path: Path, width: int, readers: Sequence[str]) -> None:
     print(f"texts from seed {SEED}")
-    system = texts(tmp_path, width, readers)
+    system = texts(tmp_path, width, readers, deliver="fabric")
     frames, aborted, whole = text_frames(100, random.Random(SEED))
-    write_stimulus(system.folder / "stimulus.txt", frames, aborted)
-    (system.folder / "expected.txt").write_text("")
     for stalls in (0, 40):
-        result = system.run(SEED=SEED, STALL_PERCENT=stalls, SHOWN=0)
-        found: dict[int, list[bytes]] = {}
-        for item in (system.folder / "received.txt").read_text().split("<")[1:]:
-            lines = [line for line in item.splitlines()[1:] if not line.startswith("!")]
-            # The publisher of an aborted text may have begun its frame.
-            if "! aborted" not in item:
-                frame = bytes.fromhex("".join(lines))
-                found.setdefault(frame[0], []).append(frame[5:])
-        assert len(found) == len(readers), result.output
+        found = whole_payloads(system, frames, aborted, stalls)
+        assert len(found) == len(readers)
         for payloads in found.values():
             assert sorted(payloads) == sorted([*whole[0], *whole[1]])
             for own in whole.values():
                 assert [payload for payload in payloads if payload in own] == own
+
+
+@pytest.mark.parametrize("width", [8, 64])
+def test_texts_also_go_to_the_host(tmp_path: Path, width: int) -> None:
+    """A publisher with a buffer does not hold the Manager while its text waits for its turn."""
+    print(f"texts from seed {SEED}")
+    system = texts(tmp_path, width, ["left"], buffer=300)
+    frames, aborted, whole = text_frames(100, random.Random(SEED))
+    for stalls in (0, 40):
+        found = whole_payloads(system, frames, aborted, stalls)
+        assert (found[0], found[1]) == (whole[0], whole[1])
+        assert sorted(found[2]) == sorted([*whole[0], *whole[1]])
+
+
+def whole_payloads(
+    system: GeneratedSystem, frames: Sequence[bytes], aborted: Collection[int], stalls: int
+) -> dict[int, list[bytes]]:
+    """The payloads of a simulation by their publishers; the publisher of an aborted text may have begun its frame."""
+    write_stimulus(system.folder / "stimulus.txt", frames, aborted)
+    (system.folder / "expected.txt").write_text("")
+    system.run(SEED=SEED, STALL_PERCENT=stalls, SHOWN=0)
+    found: dict[int, list[bytes]] = {}
+    for item in (system.folder / "received.txt").read_text().split("<")[1:]:
+        if "! aborted" not in item:
+            frame = bytes.fromhex("".join(item.splitlines()[1:]))
+            found.setdefault(frame[0], []).append(frame[5:])
+    return found
