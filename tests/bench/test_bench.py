@@ -25,7 +25,7 @@ from tests.hdl.ghdl import Library
 from tests.payloads import BrokenPayloadError, Payloads
 from tests.recall import RunResult, ran_or_recalled
 from tests.seeds import seeded
-from tools.bench import bitstreams, figures, fuzz, loops, nextpnr, store, systems, timing
+from tools.bench import bitstreams, figures, fuzz, inner_topics, loops, nextpnr, store, systems, timing
 from tools.bench.cycles import cycles_of
 from tools.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tools.bench.model import FrameError, Message, publisher_model, subscriber_model
@@ -72,6 +72,12 @@ class _DebianYosys(Yosys):
 
     def run(self, arguments: Sequence[str], directory: Path) -> RunResult:
         return ran_or_recalled(["yosys", *arguments], directory)
+
+
+def test_pipelines_within_the_fpga_do_not_share_the_channel() -> None:
+    """By the host, each message passes three times, at 8 bits with 13 beats."""
+    assert inner_topics.rate_of(2, 8, "host", 2000) == pytest.approx(1000 / 39, rel=0.1)
+    assert inner_topics.rate_of(2, 8, "fabric", 2000) > 700
 
 
 def test_every_part_has_one_page() -> None:

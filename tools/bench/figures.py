@@ -19,6 +19,7 @@ from tools.bench import (
     fuzz,
     fuzz_systems,
     images,
+    inner_topics,
     links,
     live,
     loops,
@@ -80,8 +81,8 @@ PAGES = (
     Page(
         "channel-use",
         "Figures of channel use",
-        "how much of the channel schedulers and messages with arrays use",
-        ("use", "passing"),
+        "the channel use of schedulers, messages with arrays, and topics",
+        ("use", "passing", "inner_topics"),
     ),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
     Page(
@@ -101,6 +102,7 @@ _HEADINGS = {
     "peers": "Peers",
     "use": "Channel use",
     "passing": "Messages with arrays",
+    "inner_topics": "Topics within the FPGA",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
     "loops": "Combinational loops",
@@ -137,6 +139,8 @@ _METHODS = {
     "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "passing": """The message side of a subscriber is wired to the publisher of the same message. Neither the source of
         frames nor their sink pauses. GHDL simulates both, and the cycles are counted.""",
+    "inner_topics": """Topics [within the FPGA](../reference/connections.md#topics-within-the-fpga) are compared with
+        the same topics by a host. GHDL simulates both.""",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
@@ -189,6 +193,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         timing,
         use,
         passing,
+        inner_topics,
         cycles,
         fuzz,
         fuzz_systems,
@@ -249,7 +254,7 @@ def _versions(part: str) -> str:
         return ", ".join([*tools, *simulators.versions()])
     if part == "builds":
         return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
-    if part in ("loops", "passing"):
+    if part in ("loops", "passing", "inner_topics"):
         programs = ("ghdl", "yosys", "verilator") if part == "loops" else ("ghdl",)
         return ", ".join([*map(_first_line, programs), _package("rosbags")])
     if part == "use":
