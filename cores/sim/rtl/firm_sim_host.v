@@ -701,7 +701,7 @@ module firm_sim_host #(
   // The frame that is received in place of the expected one, if it is the next one of another way.
   task try_ways(input [7:0] got, output reg is_found);
     reg [MOST_WAYS:0] seen;
-    integer           other, before, looked, origin, ignored;
+    integer           other, previous, looked, origin, ignored;
     reg               fits;
     begin
       origin   = $ftell(expected_file);
@@ -709,7 +709,7 @@ module firm_sim_host #(
       seen     = 0;
       seen[way[receiving]] = 1;
       other    = first_of_id[received_id];
-      before   = NONE;
+      previous   = NONE;
       for (looked = 0; looked < WAYS_LOOKED_AT && other != NONE && !is_found; looked = looked + 1) begin
         fits = 0;
         if (!seen[way[other]]) begin
@@ -717,10 +717,10 @@ module firm_sim_host #(
           check_like(other, got, fits);
         end
         if (fits) begin
-          if (before == NONE)
+          if (previous == NONE)
             first_of_id[received_id] = next_of_id[other];
           else
-            next_of_id[before] = next_of_id[other];
+            next_of_id[previous] = next_of_id[other];
           next_of_id[receiving]    = first_of_id[received_id];
           is_received[receiving]   = 0;
           first_of_id[received_id] = receiving;
@@ -728,7 +728,7 @@ module firm_sim_host #(
           receiving                = other;
           is_found                 = 1;
         end else begin
-          before = other;
+          previous = other;
           other  = next_of_id[other];
         end
       end

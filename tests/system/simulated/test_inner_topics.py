@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import shutil
+import subprocess
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +15,8 @@ import yaml
 
 from fusesoc_firm.frame.codec import pack_frame
 from tests.hdl.frames import write_stimulus
+from tests.hdl.verilator import simulator
+from tests.hdl.verilog import compile_verilog, translated
 from tests.seeds import seeded
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
@@ -427,3 +431,21 @@ def whole_payloads(
             frame = bytes.fromhex("".join(item.splitlines()[1:]))
             found.setdefault(frame[0], []).append(frame[5:])
     return found
+
+
+@pytest.mark.check
+@pytest.mark.skipif(
+    not all(map(shutil.which, ("iverilog", "verilator"))), reason="Icarus Verilog or Verilator is not installed"
+)
+def test_the_netlist_in_both_simulators(tmp_path: Path) -> None:
+    UNEQUAL.build(tmp_path, 8)
+    request = call(tmp_path / "inner.yaml", tmp_path / "stimuli.yaml", tmp_path / "model.py")
+    folder = tmp_path / "netlist"
+    top, files = translated(request, folder)
+    icarus = compile_verilog(top, files, folder).run(folder, SEED=3)
+    assert icarus.exit_code == 0, icarus.output
+    done = subprocess.run(
+        [str(simulator(top, files, folder)), "+SEED=3"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+    assert f"PASS {2 * COUNT}/{2 * COUNT}" in done.stdout
