@@ -33,12 +33,12 @@ end entity firm_message_queue;
 architecture rtl of firm_message_queue is
 
   -- The words of memory; the register at the sink is the further place.
-  function words_of(messages : integer) return natural is
+  function words_of(places : integer) return natural is
   begin
-    if messages < 2 then
+    if places < 2 then
       return 1;
     end if;
-    return messages - 1;
+    return places - 1;
   end function words_of;
 
   constant WORDS : natural := words_of(MESSAGES);
