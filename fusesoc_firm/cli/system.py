@@ -229,8 +229,7 @@ def _add_core(actions: Any) -> argparse.ArgumentParser:
     new.add_argument(
         "--model",
         metavar="F",
-        default="model.py",
-        help="the model that computes the expected responses (default: %(default)s)",
+        help="the model of the expected responses (default: model.py; none if all accelerators are in Python)",
     )
     new.add_argument(
         "--environment",
@@ -243,7 +242,7 @@ def _add_core(actions: Any) -> argparse.ArgumentParser:
 
 
 def _write_core(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.scaffold.core_file import CoreOptions, core_text
+    from fusesoc_firm.system.scaffold.core_file import MODEL, CoreOptions, core_text
     from fusesoc_firm.text.outputs import check_output, write
 
     path: Path = arguments.output or arguments.spec.with_suffix(".core")
@@ -253,7 +252,7 @@ def _write_core(arguments: argparse.Namespace) -> None:
         arguments.description,
         arguments.depend,
         arguments.stimuli,
-        arguments.model,
+        arguments.model or MODEL,
         arguments.environment,
         arguments.path,
         arguments.distro or "",

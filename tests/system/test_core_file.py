@@ -110,6 +110,21 @@ def test_a_new_core_without_options_is_whole(tmp_path: Path) -> None:
     assert found["targets"]["sim"]["generate"] == ["system", "simulation"]
 
 
+@pytest.mark.parametrize(("has_model", "depend"), [(False, ()), (True, ()), (False, ("robot:acc:firm_python:0.2.0",))])
+def test_functions_in_python_are_the_model_unless_there_is_one(
+    has_model: bool, depend: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "turn.py").write_text("def turn(m):\n    return {'x': m.y}\n", encoding="utf-8")
+    spec = tmp_path / "robot.yaml"
+    spec.write_text(specification(blocks(), accelerator("turn", "Point", "Point", "Python", "turn.py")))
+    if has_model:
+        (tmp_path / "model.py").touch()
+    assert main(["system", "core", str(spec), *(word for item in depend for word in ("--depend", item))]) == 0
+    found = content((tmp_path / "robot.core").read_text(encoding="utf-8"))
+    assert ("model" in found["generate"]["simulation"]["parameters"]) == has_model
+    assert found["filesets"]["base"]["depend"][1:] == [*(depend or ("robot:acc:firm_python",))]
+
+
 def test_a_new_core_is_short_enough_to_be_read(tmp_path: Path) -> None:
     options = CoreOptions(depend=["robot:acc:firm_float"])
     lines = new_core(system(tmp_path), "robot.yaml", options).splitlines()

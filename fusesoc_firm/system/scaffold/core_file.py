@@ -49,6 +49,11 @@ _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)
 # The anchor of a target; those of the product's kinds are defined by the first target of a kind.
 _ANCHOR = re.compile(r"^(  \S+:) &(?:sim|live|network|emulate|synth|board)(?= )", re.MULTILINE)
 
+MODEL = "model.py"
+"""The usual file of a model."""
+# On what a system with accelerators in Python depends.
+_PYTHON = "robot:acc:firm_python"
+
 
 @dataclass(frozen=True)
 class CoreOptions:
@@ -62,7 +67,7 @@ class CoreOptions:
     description: str = ""
     depend: Sequence[str] = ()
     stimuli: str = "stimuli.yaml"
-    model: str = "model.py"
+    model: str = MODEL
     environment: Sequence[str] = ()
     paths: Sequence[str | Path] = ()
     distro: str = ""
@@ -77,9 +82,14 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
     if path.exists():
         return updated_core(loaded.system, path)
     folder = path.absolute().parent
+    compiled = [item.type.own.accelerator.is_compiled for item in loaded.system.accelerators]
+    is_model = all(compiled) and any(compiled) and options.model == MODEL and not (folder / MODEL).exists()
+    own = [_PYTHON] if any(compiled) and not any(item.startswith(_PYTHON) for item in options.depend) else []
     options = replace(
         options,
-        depend=[*options.depend, *loaded.specification.message_cores],
+        depend=[*options.depend, *own, *loaded.specification.message_cores],
+        # The functions are the model.
+        model="" if is_model else options.model,
         paths=[os.path.relpath(item, folder) for item in options.paths],
     )
     return new_core(loaded.system, os.path.relpath(spec, folder), options)
