@@ -224,7 +224,7 @@ class Repetition(Calls):
         """Note the next values of a loop; return the values that are carried beyond expectation, or in other kinds."""
         changed: dict[Any, Carried] = {}
         now = dict(self._places(self.names, self.memory))
-        for key, before in self._places(names, memory):
+        for number, (key, before) in enumerate(self._places(names, memory)):
             after = now[key]
             known = carried.get(key)
             if isinstance(before, Unbound):
@@ -247,12 +247,20 @@ class Repetition(Calls):
                 loop.carried[key].next = converted(self.graph, after, known.value.kind)
                 continue
             kind, *limits = wanted
-            name = key if isinstance(key, str) else f"{key[1]}"
+            # The number of the place, since elements of several lists have the same index.
             leaf = self.graph.leaf(
-                "carried", kind, (loop.number, name, *limits), (limits[0], limits[1]), 2 * loop.number + 1
+                "carried", kind, (loop.number, number, *limits), (limits[0], limits[1]), 2 * loop.number + 1
             )
-            changed[key] = Carried(str(name), converted(self.graph, before, kind), leaf)
+            changed[key] = Carried(self._label(key, names, memory), converted(self.graph, before, kind), leaf)
         return changed
+
+    def _label(self, key: Any, names: Mapping[str, Value], memory: Memory) -> str:
+        """Return the name of a place for readers of the hardware: `total`, `grid_3`."""
+        if isinstance(key, str):
+            return key
+        owner, item = key
+        holder = next((place for place, value in self._places(names, memory) if value is owner), "")
+        return f"{self._label(holder, names, memory)}_{item}".lstrip("_")
 
     def _after(self, loop: Loop, carried: Mapping[Any, Carried], names: dict[str, Value], memory: Memory) -> None:
         """Set the names and the memory after a loop."""

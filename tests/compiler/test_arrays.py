@@ -32,6 +32,7 @@ class Summary:
     def __init__(self):
         self.total = 0
         self.grid = [0] * 4
+        self.twos = [0] * 4
 
     def __call__(self, m):
         nearest = 1e9
@@ -39,9 +40,10 @@ class Summary:
             if p.x < nearest:
                 nearest = p.x
             self.grid[i & 3] += 1
+            self.twos[i & 3] += 2
         for n in m.named:
             self.total += n.weight + int(n.place.y > 0.0)
-        return {"nearest": nearest, "count": self.grid[1], "total": self.total + m.tail}
+        return {"nearest": nearest, "count": self.grid[1], "total": self.total + m.tail + self.twos[1]}
 
 
 summary = Summary()
