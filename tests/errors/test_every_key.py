@@ -26,7 +26,7 @@ from tests.seeds import seeded
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
 SEED = seeded(20241103)
-_PLACE = re.compile(r"(?P<file>.*):(?P<line>\d+):(?P<column>\d+): error: (?P<message>.*)")
+_PLACE = re.compile(r"(?P<file>.*):(?P<line>\d+):(?P<column>\d+): (?P<kind>error|warning): (?P<message>.*)")
 _EXCERPT = re.compile(r" *(?P<line>\d+) \| (?P<text>.*)")
 
 
@@ -79,11 +79,13 @@ class Checker:
 
 
 def _faults(printed: str) -> list[Fault]:
-    """The printed faults; a line that does not belong to one is an error in the output."""
+    """The printed faults without warnings; a line that does not belong to one is an error in the output."""
     found: list[Fault] = []
+    kinds: list[str] = []
     for line in printed.splitlines():
         if place := _PLACE.fullmatch(line):
             found.append(Fault(place["file"], int(place["line"]), int(place["column"]), place["message"], None))
+            kinds.append(place["kind"])
             continue
         fault = found.pop()
         if excerpt := _EXCERPT.fullmatch(line):
@@ -94,7 +96,7 @@ def _faults(printed: str) -> list[Fault]:
         else:
             assert re.fullmatch(r" *\| *\^~*", line), f"neither fault nor excerpt: {line}"
         found.append(fault)
-    return found
+    return [fault for fault, kind in zip(found, kinds, strict=True) if kind == "error"]
 
 
 @pytest.fixture

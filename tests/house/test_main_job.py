@@ -70,6 +70,13 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
         ("resize", 13),
         ("multi_type", 19),
         ("robotic_arm_franka", 3),
+        ("complementary_filter", 11),
+        ("joint_pid", 9),
+        ("scan_sectors", 9),
+        ("inverse_kinematics", 8),
+        ("cloud_occupancy", 5),
+        ("state_kalman", 12),
+        ("quat2euler_python", 16),
     ],
 )
 def test_every_other_application_passes(tmp_path: Path, name: str, messages: int) -> None:

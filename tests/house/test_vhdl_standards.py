@@ -148,7 +148,9 @@ def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
     # A node in fabric is simulated with streams.
     for instance in sections["targets"]["sim"]["generate"]:
         given |= instance.get("simulation", {}) if isinstance(instance, dict) else {}
-    spec, stimuli, model = (core.parent / given.pop(name) for name in ("spec", "stimuli", "model"))
+    spec, stimuli = (core.parent / given.pop(name) for name in ("spec", "stimuli"))
+    # An accelerator in Python is its own model.
+    model = core.parent / given.pop("model") if "model" in given else None
     # The simulators of accelerators in Verilog have their bench in Verilog, too.
     is_vhdl = given.get("simulator", "ghdl") == "ghdl"
     made = write(call(spec, stimuli, model, **given), tmp_path) if is_vhdl else generate_system(spec, tmp_path)

@@ -24,7 +24,9 @@ def test_a_copy_is_a_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ca
     assert main(["init", "mine", "--example", example]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == f"next: cd mine && firm sim {example}.yaml"
     copied = {path.relative_to(tmp_path / "mine").as_posix() for path in (tmp_path / "mine").rglob("*.*")}
-    assert {f"{example}.core", f"{example}.yaml", "model.py", "fusesoc.conf", ".gitignore"} <= copied
+    # The model of an accelerator in Python is its function.
+    model = next(name for name in ("model.py", f"python/{example}.py") if (demos_root() / example / name).is_file())
+    assert {f"{example}.core", f"{example}.yaml", model, "fusesoc.conf", ".gitignore"} <= copied
     assert not any(name.endswith((".md", ".pyc")) for name in copied)
     assert "[library.mine]" in (tmp_path / "mine" / "fusesoc.conf").read_text()
     assert not has_absolute_path(tmp_path / "mine")
@@ -39,7 +41,13 @@ def has_absolute_path(project: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("words", "example"),
-    [("pid", "mobile_robot"), ("image", "image_pipeline"), ("Roll", "quat2euler"), ("q", "quat2euler")],
+    [
+        ("pid", "mobile_robot"),
+        ("image", "image_pipeline"),
+        ("Roll", "quat2euler"),
+        ("q", "quat2euler"),
+        ("height", "state_kalman"),
+    ],
 )
 def test_a_word_may_name_an_example(words: str, example: str) -> None:
     assert example_named(words, demos_root()) == example
@@ -50,7 +58,7 @@ def test_a_word_may_name_an_example(words: str, example: str) -> None:
     [
         (["--example", "quat2eular"], "did you mean 'quat2euler'"),
         (["--example", "radar"], "        mobile_robot: Four wheels of a skid-steer robot"),
-        (["--example", "in"], "        sobel: "),
+        (["--example", "a"], "        sobel: "),
         (["--example", "m"], "unknown example 'm'"),
         (["--example", "."], "unknown example '.'"),
         (["--example", ""], "        sobel: "),
