@@ -28,6 +28,7 @@ MANAGER_TITLE = "The Manager within, LUT/FF"
 # Table 5.4, the generated part and the accelerators: LUT, FF, BRAM, DSP.
 _USE_CASES = {"sobel": "1551/1294, 3 BRAM", "mobile_robot": "30127/21665, 578 DSP"}
 _TARGET = "synth_xilinx"
+_COMPILED = "robot:acc:firm_python"
 # But for their messages or their node in fabric, they are other systems.
 _TWINS = ("obstacle_node", "quat2euler_ethernet", "robotic_arm_franka")
 _MANAGER = re.compile(r"^module (firm_manager_(\d+)_(\d+)_(\d+)_\w+)", re.MULTILINE)
@@ -72,9 +73,14 @@ class NotBuiltError(Exception):
 
 
 def applications() -> dict[str, Path]:
-    """The cores of specs/ that have a netlist, by name."""
+    """The cores of specs/ that have a netlist, by name, without those of accelerators that `kernels` measures."""
     cores = (path for path in sorted(REPOSITORY.glob("specs/*/*.core")) if path.stem not in _TWINS)
-    return {path.stem: path for path in cores if _TARGET in _content(path)["targets"]}
+    contents = {path: _content(path) for path in cores}
+    return {
+        path.stem: path
+        for path, content in contents.items()
+        if _TARGET in content["targets"] and _COMPILED not in str(content["filesets"])
+    }
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:

@@ -20,6 +20,7 @@ from tools.bench import (
     fuzz_systems,
     images,
     inner_topics,
+    kernels,
     links,
     live,
     loops,
@@ -91,6 +92,12 @@ PAGES = (
         "build and simulation times",
         ("systems", "builds", "actions", "simulators", "store"),
     ),
+    Page(
+        "kernels",
+        "Figures of accelerators in Python",
+        "their area, cycles, clock and compile time",
+        ("kernels",),
+    ),
     Page("network", "Figures of a node in fabric", "area and clock", ("network",)),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
@@ -109,6 +116,7 @@ _HEADINGS = {
     "images": "Images",
     "links": "Links and crossings",
     "applications": "Applications",
+    "kernels": "Kernels",
     "network": "ROS 2 by Ethernet",
     "systems": "Systems",
     "builds": "Builds",
@@ -152,9 +160,15 @@ _METHODS = {
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
     "links": "LUT and FF are counted as in [Area](converters.md#area).",
     "applications": f"""Each of the [demo systems](../reference/applications.md) is measured as a whole, with its
-        streams as ports, as in [Area](converters.md#area). Yosys runs `{yosys.ECP5.synthesis}` for ECP5 and
-        `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*` run the same commands with the installed
-        Yosys.""",
+        streams as ports, as in [Area](converters.md#area); [another page](kernels.md) lists those in Python. Yosys
+        runs `{yosys.ECP5.synthesis}` for ECP5 and `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*`
+        run the same commands with the installed Yosys.""",
+    "kernels": """The [demo systems](../reference/applications.md) with `type: Python`, and functions in
+        tools/bench/kernels, are compiled with one operator of each kind
+        ([Accelerators in Python](../reference/python.md)). The entity of each is measured without converters. LUT4, FF
+        and MHz are measured as in [Timing](timing.md#timing). `make bench BENCH='kernels --row pid'` measures only
+        the rows whose names match. `HOLOSO=PYTHON` names a Python with
+        [Holoso](https://pypi.org/project/holoso/), for the second table.""",
     "network": f"""LUT4, FF and MHz are measured as in [Timing](timing.md#timing), with nextpnr's
         `{network.DEVICE}`.""",
     "systems": "The table lists the time to check and generate a large system.",
@@ -201,6 +215,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         images,
         links,
         applications,
+        kernels,
         network,
         peers,
         systems,
@@ -266,9 +281,9 @@ def _versions(part: str) -> str:
         tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
-    elif part in ("area", "manager", "timing", "network", "peers", "links", "applications"):
+    elif part in ("area", "manager", "timing", "kernels", "network", "peers", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
-        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "network", "peers") else []
+        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "kernels", "network", "peers") else []
         tools += peers.versions() if part == "peers" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
