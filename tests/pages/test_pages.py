@@ -25,6 +25,7 @@ FOLLOWED = [
     "tutorials/first-accelerator-in-python.md",
     "how-to/start-from-a-bag.md",
     "how-to/explore-an-accelerator.md",
+    "how-to/port-a-node-to-hardware.md",
     "how-to/when-it-does-not-work.md",
     # It builds a bitstream, which takes minutes.
     pytest.param("how-to/onto-an-icebreaker.md", marks=pytest.mark.thorough),
