@@ -72,7 +72,7 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
         ("robotic_arm_franka", 3),
         ("complementary_filter", 11),
         ("joint_pid", 9),
-        ("scan_sectors", 9),
+        ("scan_sectors", 18),
         ("inverse_kinematics", 8),
         ("cloud_occupancy", 5),
         ("state_kalman", 12),

@@ -13,4 +13,6 @@ def cloud_occupancy(cloud):
             column = sum([p.x >= edge for edge in EDGES])
             row = sum([p.y >= edge for edge in EDGES])
             cells[SIDE * row + column] = 100
-    return {"header": cloud.header, "resolution": 0.5, "cells": cells}
+    corner = {"position": {"x": -2.0, "y": -2.0}, "orientation": {"w": 1.0}}
+    grid = {"resolution": 0.5, "width": SIDE, "height": SIDE, "origin": corner}
+    return {"header": cloud.header, "info": grid, "data": cells}

@@ -8,7 +8,7 @@ LOWER = 0.2  # from the elbow to the tool, in m
 
 
 def inverse_kinematics(target):
-    """Return the angles in rad as x, y and z for a point in m, or nothing if the arm does not reach it."""
+    """Return the angles in rad for a point in m, or nothing if the arm does not reach it."""
     point = target.point
     across = math.sqrt(point.x**2 + point.y**2)
     up = point.z - HEIGHT
@@ -19,4 +19,4 @@ def inverse_kinematics(target):
     base = math.atan2(point.y, point.x)
     shoulder = math.atan2(up, across) - math.atan2(LOWER * side, UPPER + LOWER * bend)
     elbow = math.atan2(side, bend)
-    return {"header": {"stamp": target.header.stamp}, "vector": {"x": base, "y": shoulder, "z": elbow}}
+    return {"data": [base, shoulder, elbow]}

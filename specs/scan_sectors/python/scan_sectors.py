@@ -1,4 +1,4 @@
-"""The nearest obstacle around a robot, and the nearest ones of eight sectors, in one pass over a scan."""
+"""A scan of eight sectors with the nearest range of each, and the nearest range of all, in one pass."""
 
 import math
 
@@ -9,20 +9,22 @@ NONE = np.float32(math.inf)
 
 
 def scan_sectors(scan):
-    """Return the smallest range and its angle, and the smallest range of each sector, in m and rad."""
+    """Return the scan of sectors, of which each has the angle of its first range in rad, and the nearest range in m."""
     size = (len(scan.ranges) + SECTORS - 1) // SECTORS
     minima = [NONE] * SECTORS
     low, sector, count = NONE, 0, 0
-    nearest, place = NONE, 0
-    for i, r in enumerate(scan.ranges):
+    nearest = NONE
+    for r in scan.ranges:
         if scan.range_min <= r <= scan.range_max:
             if r < low:
                 low = r
             if r < nearest:
-                nearest, place = r, i
+                nearest = r
         minima[sector] = low
         count += 1
         if count == size:
             low, sector, count = NONE, sector + 1, 0
-    angle = scan.angle_min + place * scan.angle_increment
-    return {"header": scan.header, "nearest": nearest, "angle": angle, "minima": minima}
+    step = size * scan.angle_increment
+    kept = {"header": scan.header, "range_min": scan.range_min, "range_max": scan.range_max}
+    angles = {"angle_min": scan.angle_min, "angle_max": scan.angle_max, "angle_increment": step}
+    return {**kept, **angles, "ranges": minima}, {"data": nearest}
