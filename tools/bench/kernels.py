@@ -83,7 +83,7 @@ class Compiled:
 
 KERNELS = (
     Kernel("pid", _OWN, "float64", Bars(30, 70, 0, 3800, 130)),
-    Kernel("pid", _OWN, "float32", Bars(30, 66, 0, 1900, 140)),
+    Kernel("pid32", _OWN, "float32", Bars(30, 66, 0, 1900, 140)),
     Kernel("complementary_filter", _SPECS / "complementary_filter/complementary_filter.yaml", "float64",
            Bars(25, 190, 0, 7500, 110)),
     Kernel("inverse_kinematics", _SPECS / "inverse_kinematics/inverse_kinematics.yaml", "float64",

@@ -30,7 +30,8 @@ class StateKalman:
         height, rate = self.height + PERIOD * self.rate, self.rate
         p = total(product(product(MOTION, self.covariance), transposed(MOTION)), ADDED)
         if ground.min_range <= ground.range <= ground.max_range:
-            gain = [p[0][0] / (p[0][0] + MEASURED), p[1][0] / (p[0][0] + MEASURED)]
+            scale = 1.0 / (p[0][0] + MEASURED)
+            gain = [p[0][0] * scale, p[1][0] * scale]
             error = ground.range - height
             height, rate = height + gain[0] * error, rate + gain[1] * error
             p = product([[1.0 - gain[0], 0.0], [-gain[1], 1.0]], p)

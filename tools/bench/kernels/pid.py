@@ -15,3 +15,4 @@ class Pid:
 
 
 pid = Pid()
+pid32 = Pid()
