@@ -78,16 +78,17 @@ def late(loops: Sequence[Loop], answers: Sequence[Answer]) -> Iterator[tuple[Loo
         needed += [(node, phase) for item in made if item.loop is loop for node in chain(*item.fields.values())]
         for node, last in needed:
             if node.phase > last:
-                yield loop, _late_name(node)
+                yield loop, _late_name(node, loops)
                 break
 
 
-def _late_name(node: Node) -> str:
+def _late_name(node: Node, loops: Sequence[Loop]) -> str:
     """Return the name of the field, or of the result of a loop, for which a value waits."""
     while node.operands:
         node = max(node.operands, key=lambda item: item.phase)
     if node.operation == "final":
-        return str(node.payload[1][1])
+        carried = chain(*(loop.carried.values() for loop in loops))
+        return next(item.name.rpartition("_")[0] for item in carried if item.value.payload == node.payload[1])
     return re.sub(r"^in\d*_", "", node.payload.port)
 
 

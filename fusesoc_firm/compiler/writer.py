@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
@@ -95,7 +96,10 @@ class Writer:
         """Return the name of a value that a pipeline hands on."""
         if node.operation == "input":
             return str(node.payload.port)
-        return str(node.payload[1]) if node.operation == "carried" else node.name or f"{node.operation}_{node.number}"
+        if node.operation == "carried":
+            carried = chain(*(loop.carried.values() for loop in self.program.loops))
+            return next(item.name for item in carried if item.value is node)
+        return node.name or f"{node.operation}_{node.number}"
 
     def _has_signal(self, node: Node) -> bool:
         return node.operation not in LEAVES and node.operation not in TRANSPARENT and not is_operator(node)
