@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 from tests.recall import digest_of_source
@@ -74,11 +75,23 @@ class Analyses:
 
     def make(self, sources: Sequence[Source], run: Callable[[Sequence[Source]], None]) -> None:
         """Analyse what these files need and was not analysed."""
-        wanted = set(map(id, sources))
-        for analysis in self._all:
-            if not analysis.is_done and any(id(source) in wanted for source in analysis.sources):
+        for analysis in self._needed(sources):
+            if not analysis.is_done:
                 run(analysis.sources)
                 analysis.is_done = True
+
+    def _needed(self, sources: Sequence[Source]) -> list[_Analysis]:
+        """The commands that analyse these files. What other files of a command need is needed, too."""
+        wanted, found = set(map(id, sources)), list[_Analysis]()
+        while True:
+            before, found = found, [item for item in self._all if any(id(source) in wanted for source in item.sources)]
+            if len(found) == len(before):
+                return found
+            units: dict[str, set[str]] = {}
+            for source in chain.from_iterable(item.sources for item in found):
+                units.setdefault(source.library, set()).update(source.units)
+            for library, names in units.items():
+                wanted |= set(map(id, self.sources(library, names)))
 
     def make_all(self, run: Callable[[Sequence[Source]], None]) -> None:
         """Analyse all that was not."""
