@@ -168,7 +168,7 @@ _METHODS = {
         ([Accelerators in Python](../reference/python.md)). The entity of each is measured without converters. LUT4, FF
         and MHz are measured as in [Timing](timing.md#timing). `make bench BENCH='kernels --row pid'` measures only
         the rows whose names match. `HOLOSO=PYTHON` names a Python with
-        [Holoso](https://pypi.org/project/holoso/), for the second table.""",
+        the package holoso, for the second table.""",
     "network": f"""LUT4, FF and MHz are measured as in [Timing](timing.md#timing), with nextpnr's
         `{network.DEVICE}`.""",
     "systems": "The table lists the time to check and generate a large system.",

@@ -128,8 +128,9 @@ class _Topics:
             return self._by_host(name, giving, taking)
         to_host = [item for item in publishers if self.blocks[item].deliver != FABRIC]
         from_host = [item for item in readers if self.blocks[item].deliver == BOTH]
-        for block in publishers if not to_host else [item for item in publishers if item not in to_host]:
-            self._check_keys(block, PUBLISHER)
+        for block in publishers:
+            if block not in to_host:
+                self._check_keys(block, PUBLISHER)
         for block in readers:
             self._check_reader(block, is_inner=block not in from_host)
         topic = InnerTopic(name, tuple(publishers), tuple(readers), tuple(to_host), tuple(from_host))
