@@ -26,6 +26,7 @@ ALLOWED: dict[str, str] = {
     "converter": "core frame message text tools",
     "compiler": "converter frame text tools",
     "netlist": "text tools",
+    "noc": "text",
     "scheduling": "text tools",
     "system": "compiler converter core frame message scheduling text tools",
     "cocotb": "converter frame message system",
