@@ -14,8 +14,14 @@ from tests.recall import RunResult
 from tests.seeds import seeded
 
 SEED = seeded(20261130)
-# A ring deadlocks if flows use all of its links one after the other.
+# Rings and tori deadlock if flows use all links of a circle one after the other.
 _ONE_WAY = tuple(Flow(source, (sink,)) for source in range(5) for sink in range(source + 1, 6))
+_UP = tuple(
+    Flow(source, (sink,))
+    for source in range(9)
+    for sink in range(9)
+    if source != sink and sink % 3 >= source % 3 and sink // 3 >= source // 3
+)
 _COPIES = (
     Flow(0, (1, 2, 3)),
     Flow(1, (0, 2)),
@@ -33,7 +39,7 @@ NETWORKS = {
     "chain": network(chain(5), all_to_all(5)),
     "tree": network(tree(18), all_to_all(18)),
     "ring": network(ring(6), _ONE_WAY),
-    "torus": network(torus(3, 2), _ONE_WAY),
+    "torus": network(torus(3, 3), _UP),
     "one flow": network(chain(2), (Flow(1, (0,)),)),
 }
 
