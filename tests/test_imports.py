@@ -28,7 +28,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "noc": "text",
     "scheduling": "text tools",
-    "system": "compiler converter core frame message scheduling text tools",
+    "system": "compiler converter core frame message noc scheduling text tools",
     "cocotb": "converter frame message system",
     "fabric": "message system text tools",
     "accelerator": "compiler converter frame netlist system text tools",
@@ -37,7 +37,7 @@ ALLOWED: dict[str, str] = {
     "builds": "converter core fabric message node runs system text tools",
     "api": "accelerator builds frame message node runs system text",
     "studio": "accelerator builds converter core frame message node runs scheduling system text tools",
-    "exploration": "accelerator compiler frame netlist runs studio system text tools",
+    "exploration": "accelerator compiler frame netlist noc runs studio system text tools",
     "cli": "accelerator builds converter exploration fabric message node runs scheduling studio system text tools",
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

@@ -186,7 +186,7 @@ def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
     hardware = Software(blocks=system.accelerators, connections=system.connections)
     functions = Functions.of(hardware, folder)
 
-    outputs = {item.block: End(item.block, item.output.prefix) for item in system.junctions}
+    outputs = {item.block: [End(item.block, side.prefix) for side in item.outputs] for item in system.junctions}
 
     def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
         answers = []
@@ -198,7 +198,7 @@ def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
             if passed > _MOST_PASSED:
                 fail(f"the messages that a message to '{subscriber}' causes circulate through '{name}' without an end")
             if name in outputs:
-                left.extend(functions.take(outputs[name], answer))
+                left.extend(taken for output in outputs[name] for taken in functions.take(output, answer))
             else:
                 answers.append((name, answer))
         return answers

@@ -150,31 +150,38 @@ def _topology(kind: str, routers: int, step: Callable[[int, int], int], each: in
     return Topology(kind, tuple(router for router in numbers for _ in range(each)), steps, columns)
 
 
-def topologies(endpoints: int) -> tuple[Topology, ...]:
-    """Return the candidates for a number of endpoints, one of each kind that makes sense.
+def topology(kind: str, endpoints: int) -> Topology:
+    """Return the topology of a kind for a number of endpoints; grids are as square as possible and may have more.
 
-    All have a slot for each endpoint; grids are as square as possible and may have more.
+    Raises `ValueError` for an unknown kind.
     """
-    found = [crossbar(endpoints)]
-    if endpoints >= 2:
-        found.append(chain(endpoints))
-    if endpoints >= 3:
-        found.append(ring(endpoints))
-    if endpoints > 2 * _FOLD:
-        found.append(tree(endpoints))
-    if endpoints >= 4:
-        found.append(mesh(*_sides(endpoints)))
-    if endpoints > 3 * _FOLD:
-        found.append(mesh(*_sides(-(-endpoints // _FOLD)), each=_FOLD))
-    if endpoints >= 9:
-        found.append(torus(*_sides(endpoints)))
-    return tuple(sorted(found, key=lambda topology: KINDS.index(topology.kind)))
+    if kind not in _MAKERS:
+        raise ValueError(f"topology '{kind}'; legal: {', '.join(KINDS)}")
+    return _MAKERS[kind](endpoints)
+
+
+def topologies(endpoints: int) -> tuple[Topology, ...]:
+    """Return the candidates for a number of endpoints, one of each kind that makes sense."""
+    return tuple(topology(kind, endpoints) for kind in KINDS if endpoints >= _LEAST[kind])
 
 
 def _sides(count: int) -> tuple[int, int]:
     """Return the columns and rows of a nearly square grid with a place for each of `count`."""
     rows = max(1, isqrt(count))
     return -(-count // rows), rows
+
+
+_MAKERS: Mapping[str, Callable[[int], Topology]] = {
+    CROSSBAR: crossbar,
+    MESH: lambda endpoints: mesh(*_sides(endpoints)),
+    CONCENTRATED: lambda endpoints: mesh(*_sides(-(-endpoints // _FOLD)), each=_FOLD),
+    CHAIN: chain,
+    TREE: tree,
+    RING: ring,
+    TORUS: lambda endpoints: torus(*_sides(endpoints)),
+}
+# The least endpoints for which a topology makes sense; with fewer, a simpler one is the same or better.
+_LEAST = {CROSSBAR: 1, MESH: 4, CONCENTRATED: 3 * _FOLD + 1, CHAIN: 2, TREE: 2 * _FOLD + 1, RING: 3, TORUS: 9}
 
 
 @dataclass(frozen=True)
@@ -285,15 +292,16 @@ class Network:
         """The sum of rate times routers over all ways: the beats in routers in a cycle."""
         return sum(flow.rate * len(self.ways[flow.source, sink]) for flow in self.flows for sink in flow.sinks)
 
-    def cycle(self, held: Collection[int] = ()) -> tuple[Channel, ...] | None:
+    def cycle(self, held: Collection[tuple[int, int]] = ()) -> tuple[Channel, ...] | None:
         """Return channels that may wait for each other in a cycle, or None: then there is no deadlock.
 
-        Endpoints in `held` may hold the frame at their input until the one at their output is taken.
+        For each pair of endpoints in `held`, the first one may hold a frame that it receives until the second one has
+        sent a frame.
         """
-        found = _cycle(self._waits(frozenset(held)))
+        found = _cycle(self._waits(held))
         return None if found is None else tuple(node for node in found if isinstance(node, Channel))
 
-    def _waits(self, held: frozenset[int]) -> Mapping[Channel | int, set[Channel | int]]:
+    def _waits(self, held: Collection[tuple[int, int]]) -> Mapping[Channel | int, set[Channel | int]]:
         """Return for each channel, and each endpoint as the sink of one, for what it may have to wait."""
         waits: dict[Channel | int, set[Channel | int]] = {}
         for flow in self.flows:
@@ -303,8 +311,8 @@ class Network:
                 for channel, following in pairwise(channels):
                     waits.setdefault(channel, set()).add(following)
                 outputs.append((sink, channels[-1]))
-                if flow.source in held:
-                    waits.setdefault(flow.source, set()).add(channels[0])
+                for holder in (holder for holder, sender in held if sender == flow.source):
+                    waits.setdefault(holder, set()).add(channels[0])
             for number, output in outputs:
                 # A frame with copies holds the lower outputs while it waits for a higher one, and all of them while it
                 # waits for a sink.

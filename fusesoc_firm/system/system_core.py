@@ -19,6 +19,8 @@ from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Definitions, Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.noc.hardware import TEMPLATE as ROUTERS_TEMPLATE
+from fusesoc_firm.noc.hardware import exchange_configuration
 from fusesoc_firm.system.boards.block_design import (
     BLOCK_DESIGN_TEMPLATE,
     PACKAGE_TEMPLATE,
@@ -56,6 +58,12 @@ from fusesoc_firm.system.derived.services import with_services
 from fusesoc_firm.system.hardware.bypass import BYPASS_TEMPLATE, bypass_configuration
 from fusesoc_firm.system.hardware.compiled import compiled, compiler_files
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
+from fusesoc_firm.system.hardware.exchange import (
+    EXCHANGE_TEMPLATE,
+    exchange_entity,
+    exchange_unit,
+    routers_entity,
+)
 from fusesoc_firm.system.hardware.hls import wrapper
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map, registers_configuration
 from fusesoc_firm.system.hardware.status import (
@@ -280,6 +288,11 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
         signatures = identity(loaded).signatures
         configuration = registers_configuration(status_registers(loaded), signatures, address_bits(system))
         yield Artifact(f"{status_entity(system)}.vhd", REGISTERS_TEMPLATE, configuration)
+    if system.exchange:
+        routers = routers_entity(system)
+        configuration = exchange_configuration(routers, system.exchange.network, system.width)
+        yield Artifact(f"{routers}.vhd", ROUTERS_TEMPLATE, configuration)
+        yield Artifact(f"{exchange_entity(system)}.vhd", EXCHANGE_TEMPLATE, exchange_unit(system))
     yield Artifact(f"{system.entity}.vhd", SYSTEM_TEMPLATE, system_configuration(system))
 
 

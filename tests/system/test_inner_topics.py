@@ -205,6 +205,95 @@ def test_a_picture_names_the_topic_of_a_wire(tmp_path: Path) -> None:
     assert "/middle<br/>192 bits" in text
 
 
+def exchanged(fabric: str, blocks: str) -> str:
+    """The blocks in a specification whose topics pass an exchange."""
+    return specification(blocks, PASSING + JOINING).replace("{name: robot", f"{{name: robot, fabric: {fabric}")
+
+
+def derived_from(folder: Path, text: str) -> tuple[DerivedSystem, list[str]]:
+    (folder / "acc.vhd").touch()
+    path = folder / "spec.yaml"
+    path.write_text(text, encoding="utf-8")
+    loaded = load_system(path, LIBRARIES)
+    return loaded.system, [item.message for item in loaded.warnings]
+
+
+def test_a_topic_passes_the_exchange(tmp_path: Path) -> None:
+    """The publisher's own way to the host stays, and so does a queue; one endpoint may have both directions."""
+    blocks = two(", deliver: fabric", reader=", qos: {depth: 4}")
+    system, warnings = derived_from(tmp_path, exchanged("crossbar", blocks))
+    assert ways(system) == [
+        ("raw", "first/in_"),
+        ("raw", "other/in_"),
+        ("first", "a_middle_exchange/in0_"),
+        ("other", "a_middle_exchange/in1_"),
+        ("other", "other_out"),
+        ("reader", "done"),
+        ("a_middle_exchange", "reader_in_queue/in_"),
+        ("reader_in_queue", "reader/in_"),
+    ]
+    assert warnings == []
+    assert ways_of_topics(system) == [
+        (
+            "topic /a/middle: first_out, other_out -> reader_in within the FPGA by the exchange, a crossbar of 3"
+            " endpoints, a queue of 4 messages (reader_in_queue); other_out also to the host; first_out not to the"
+            " host ('deliver: fabric')"
+        )
+    ]
+    found = topics_description(system)
+    assert found["Junctions"][0] == {
+        "block": "a_middle_exchange",
+        "nameMW": "geometry_msgs/Point",
+        "topic": "/a/middle",
+        "sources": 2,
+        "readers": 1,
+    }
+    assert found["Exchange"] == {
+        "topology": "crossbar",
+        "routers": 1,
+        "turns": 2,
+        "endpoints": [
+            {"block": "first", "router": 0, "sends": "a_middle_exchange"},
+            {"block": "other", "router": 0, "sends": "a_middle_exchange"},
+            {"block": "reader", "router": 0, "receives": "a_middle_exchange"},
+        ],
+    }
+    assert "<b>exchange: 2 to 1</b><br/>/a/middle" in diagram(system)
+
+
+def test_an_endpoint_sends_and_receives(tmp_path: Path) -> None:
+    """In a chain, each block is next to the one that it sends to, so that no two topics share a link."""
+    text = exchanged(
+        "chain",
+        converter("raw", "subscriber", "Point", "one")
+        + instance("one", "passing", "a_out")
+        + on("a", converter("a_out", "publisher", "Point"), ", deliver: fabric")
+        + on("b", converter("b_in", "subscriber", "Point", "three"))
+        + instance("three", "passing", "done")
+        + on("a", converter("a_in", "subscriber", "Point", "two"))
+        + instance("two", "passing", "b_out")
+        + on("b", converter("b_out", "publisher", "Point"), ", deliver: fabric")
+        + converter("done", "publisher", "Point"),
+    )
+    system, _ = derived_from(tmp_path, text)
+    exchange = system.exchange
+    assert exchange is not None
+    places = dict(zip((end.block for end in exchange.ends), exchange.network.places, strict=True))
+    assert {abs(places["one"] - places["two"]), abs(places["two"] - places["three"])} == {1}
+    assert [(end.source is None, end.sink is None) for end in exchange.ends] == [
+        (False, True),
+        (False, False),
+        (True, False),
+    ]
+
+
+def test_a_fabric_without_a_topic_is_warned_of(tmp_path: Path) -> None:
+    lines = converter("raw", "subscriber", "Point", "done") + converter("done", "publisher", "Point")
+    system, warnings = derived_from(tmp_path, exchanged("mesh", lines))
+    assert system.exchange is None
+    assert warnings == ["'fabric: mesh' has no effect: no topic of fixed size is within the FPGA"]
+
+
 def test_blocks_meet_at_an_input(tmp_path: Path) -> None:
     lines = (
         converter("raw", "subscriber", "Point", "one", "two")

@@ -17,6 +17,7 @@ from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in
 from fusesoc_firm.system.derived.actions import actions_of
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.entities import check_entities
+from fusesoc_firm.system.derived.exchange import exchange_of
 from fusesoc_firm.system.derived.held import check_held
 from fusesoc_firm.system.derived.inner_topics import Met, meet
 from fusesoc_firm.system.derived.lateness import with_lateness_buffers
@@ -58,7 +59,7 @@ def derive(
     project = specification.project
     clock = clock_frequency(project, faults)
     clocks = clocks_of(specification, clock, faults)
-    flow = _data_flow(resolved, faults)
+    flow = _data_flow(resolved, project, faults)
     faults.raise_if_any()
     parts = flow.parts
     parts.check(resolved.blocks, project.id_bytes, faults)
@@ -92,6 +93,7 @@ def derive(
         actions=flow.actions,
         junctions=flow.met.junctions,
         inner_topics=flow.met.topics,
+        exchange=exchange_of(project, flow.met.junctions, flow.connections, flow.met.topics, faults),
     )
     check_entities(system, parts.blocks, faults)
     check_held(system, parts.blocks, faults)
@@ -120,7 +122,7 @@ class _Flow:
     met: Met
 
 
-def _data_flow(resolved: Resolved, faults: Diagnostics) -> _Flow:
+def _data_flow(resolved: Resolved, project: Project, faults: Diagnostics) -> _Flow:
     """Connect the blocks, and partition them into hardware and software."""
     blocks, inputs, outputs = resolved.blocks, resolved.inputs, resolved.outputs
     names = message_names(blocks, inputs, outputs)
@@ -129,7 +131,7 @@ def _data_flow(resolved: Resolved, faults: Diagnostics) -> _Flow:
     wiring = resolved.wiring(faults)
     before = Met(blocks, inputs, outputs, wiring.connect())
     software = resolved.instances(is_software=True)
-    met = meet(before, uses, wiring.merged, wiring.software, faults)
+    met = meet(before, uses, wiring, project, faults)
     parts = Parting(met.blocks, software, met.inputs, met.outputs, met.connections, names).parts()
     services = services_of(blocks, parts, faults)
     actions = actions_of(blocks, parts, faults)

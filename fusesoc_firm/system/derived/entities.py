@@ -23,6 +23,8 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
         f"{system.entity}_tb": "the system's test bench",
         f"{system.entity}_live": "the system's live test bench",
         f"{system.entity}_in_environment": "the system's test bench",
+        f"{system.entity}_exchange": "the system's exchange",
+        f"{system.entity}_routers": "the routers of the system's exchange",
         f"{system.entity}_rom": "the memory of the system's node",
         f"{system.entity}_network": "the test bench of the system's node",
         f"{system.entity}_node": "the system's node",

@@ -2,7 +2,8 @@
 
 The messages of a publisher go straight from the blocks that feed the publisher to the blocks that the subscriber feeds,
 so neither converter is needed for them. Where the messages of several publishers meet, or where several blocks feed one
-input, there is a merge. A subscriber with a queue becomes a queue of messages.
+input, there is a merge. A subscriber with a queue becomes a queue of messages. In place of wires and a merge, a topic
+may pass the exchange.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import permutations
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in_use
 from fusesoc_firm.frame.values import dotted
-from fusesoc_firm.system.derived.connections import cycles_of
+from fusesoc_firm.system.derived.connections import Wiring, cycles_of
 from fusesoc_firm.system.derived.joins import joins
 from fusesoc_firm.system.derived.model import (
     Connection,
@@ -29,7 +30,17 @@ from fusesoc_firm.system.derived.model import (
 )
 from fusesoc_firm.system.derived.queue import MOST_FRAMES
 from fusesoc_firm.system.derived.topics import TopicUse
-from fusesoc_firm.system.written.specification import BLOCK, BOTH, FABRIC, HOST, PUBLISHER, SUBSCRIBER, Block
+from fusesoc_firm.system.written.specification import (
+    BLOCK,
+    BOTH,
+    FABRIC,
+    HOST,
+    PUBLISHER,
+    SUBSCRIBER,
+    WIRED,
+    Block,
+    Project,
+)
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 from fusesoc_firm.text.yaml_text import Text
@@ -63,16 +74,14 @@ class Met:
         return frozenset(item.block for item in self.junctions if item.sources > 1)
 
 
-def meet(
-    before: Met, uses: Iterable[TopicUse], merged: Collection[End], software: Collection[str], faults: Diagnostics
-) -> Met:
+def meet(before: Met, uses: Iterable[TopicUse], wiring: Wiring, project: Project, faults: Diagnostics) -> Met:
     """Return the system in which the publishers and readers of each topic meet within the FPGA; note faults.
 
-    `uses` are all uses of topics, `merged` the inputs that several blocks feed, and `software` the names of blocks in
-    software, whose topics pass the host.
+    `uses` are all uses of topics. Topics of blocks in software pass the host.
     """
+    merged = wiring.merged
     is_sound = not faults.found
-    topics = _Topics(before.blocks, before.connections, frozenset(software), faults)
+    topics = _Topics(before.blocks, before.connections, wiring.software, faults)
     met = _by_topic(uses)
     topics.check_loops(met.values())
     found = tuple(topic for uses_of in met.values() if (topic := topics.topic(uses_of)))
@@ -82,7 +91,7 @@ def meet(
     if not is_sound or not (merged or inner):
         return before
     names = _names_of_junctions(before.blocks, inner, merged)
-    meeting = _Meeting(_with_merges(before, merged, names), inner, names, faults)
+    meeting = _Meeting(_with_merges(before, merged, names), inner, names, project, faults)
     return meeting.met() if meeting.may_meet() else before
 
 
@@ -241,7 +250,8 @@ def _names_of_junctions(
         ("input", end): (end.block, end.prefix.rstrip("_"), "merge") for end in sorted(merged, key=str)
     }
     for number, topic in enumerate(topics):
-        words["topic", number] = (*topic.name.strip("/").split("/"), "merge")
+        for kind in ("merge", "exchange"):
+            words[kind, number] = (*topic.name.strip("/").split("/"), kind)
         words |= {(kind, reader): (reader, kind) for reader in topic.readers for kind in ("merge", "queue")}
     taken = [identifier(name) for name in blocks]
     return dict(zip(words, distinct_identifiers(words.values(), taken), strict=True))
@@ -272,7 +282,7 @@ def _with_junctions(before: Met, junctions: Sequence[Junction]) -> Met:
         before,
         blocks={**before.blocks, **{item.block: _block(item, before.blocks) for item in junctions}},
         inputs={**before.inputs, **{item.block: item.inputs for item in junctions}},
-        outputs={**before.outputs, **{item.block: (item.output,) for item in junctions}},
+        outputs={**before.outputs, **{item.block: item.outputs for item in junctions}},
         junctions=tuple(junctions),
     )
 
@@ -293,6 +303,7 @@ class _Meeting:
     before: Met
     topics: Sequence[InnerTopic]
     names: Mapping[_Key, str]
+    project: Project
     faults: Diagnostics
     junctions: dict[str, Junction] = field(default_factory=dict)
     # For each reader behind a junction, the output of the junction.
@@ -315,6 +326,19 @@ class _Meeting:
             for name in names
             if name not in kept
         }
+
+    @cached_property
+    def _exchanged(self) -> frozenset[str]:
+        """The names of the topics that pass the exchange; strings and arrays are streams, which need few wires."""
+        if self.project.fabric in WIRED:
+            return frozenset()
+        return frozenset(
+            topic.name for topic in self.topics if self.before.outputs[topic.readers[0]][0].frame.is_fixed_size
+        )
+
+    def _has_merge(self, topic: InnerTopic, reader: str) -> bool:
+        """Whether all publishers of a topic must provide the same fields to a reader."""
+        return len(topic.publishers) > 1 or reader in topic.from_host or topic.name in self._exchanged
 
     # --- may they meet? --------------------------------------------------------------------------------------------
 
@@ -356,8 +380,7 @@ class _Meeting:
         Where messages of several sources meet, all of them have the same fields.
         """
         needed = self._needs(reader)
-        has_merge = len(topic.publishers) > 1 or reader in topic.from_host
-        required = needed if has_merge else self._needs(reader, only_accelerators=True)
+        required = needed if self._has_merge(topic, reader) else self._needs(reader, only_accelerators=True)
         for publisher in topic.publishers:
             given = self._given(publisher)
             if missing := sorted(required - given if needed & given else needed):
@@ -434,11 +457,13 @@ class _Meeting:
 
     def _make_outlets(self, topic: InnerTopic, number: int) -> None:
         """Make the junctions of a topic, and note for each reader behind one the output from which it receives."""
-        outlet = None
-        if len(topic.publishers) > 1:
-            junction = self._junction(self.names["topic", number], topic, topic.readers)
-            outlet = self._make(replace(junction, sources=len(topic.publishers)))
-        for reader in topic.readers:
+        outlets: Sequence[_Source | None] = [None] * len(topic.readers)
+        if topic.name in self._exchanged:
+            outlets = self._outlets(self._exchange(topic, self.names["exchange", number]))
+        elif len(topic.publishers) > 1:
+            junction = self._junction(self.names["merge", number], topic, topic.readers)
+            outlets = [self._make(replace(junction, sources=len(topic.publishers)))] * len(topic.readers)
+        for reader, outlet in zip(topic.readers, outlets, strict=True):
             if found := self._make_outlet(topic, reader, outlet):
                 self.outlets[reader] = found
 
@@ -460,31 +485,42 @@ class _Meeting:
         frame = self.before.outputs[topic.readers[0]][0].frame
         return Junction(name, with_names_in_use(select(frame), names), topic.name)
 
+    def _exchange(self, topic: InnerTopic, name: str) -> Junction:
+        """Return the topic as a part of the exchange, with an output for each reader."""
+        junction = self._junction(name, topic, topic.readers)
+        return replace(junction, sources=len(topic.publishers), readers=len(topic.readers))
+
     def _make(self, junction: Junction) -> _Source:
+        return self._outlets(junction)[0]
+
+    def _outlets(self, junction: Junction) -> list[_Source]:
+        """Make a junction, and return its outputs."""
         self.junctions[junction.block] = junction
-        return _Source(End(junction.block, junction.output.prefix), _names(junction.frame))
+        return self._outputs(junction.block)
 
     def _feed_junctions(self, topic: InnerTopic, number: int) -> None:
         """Connect the publishers with the junctions of a topic, and these with each other."""
-        given = self._feeds(topic.publishers[0])
-        if len(topic.publishers) > 1:
-            merge = self.names["topic", number]
-            for place, publisher in enumerate(topic.publishers):
-                self._link_all(self._feeds(publisher), End(merge, f"in{place}_"))
-            given = [self._output(merge)]
-        for reader in topic.readers:
-            sources = given
+        given = [self._feeds(topic.publishers[0])] * len(topic.readers)
+        names = [self.names[kind, number] for kind in ("merge", "exchange")]
+        for name in (item for item in names if item in self.junctions):
+            junction = self.junctions[name]
+            for side, publisher in zip(junction.inputs, topic.publishers, strict=True):
+                self._link_all(self._feeds(publisher), End(name, side.prefix))
+            outputs = self._outputs(name)
+            given = [[item] for item in (outputs if junction.is_exchanged else outputs * len(topic.readers))]
+        for reader, feeds in zip(topic.readers, given, strict=True):
+            sources = feeds
             merge, queue = self.names["merge", reader], self.names["queue", reader]
             if merge in self.junctions:
                 self._link_all(sources, End(merge, "in0_"))
                 self._link_end(End(reader), self._needs(reader), End(merge, "in1_"))
-                sources = [self._output(merge)]
+                sources = self._outputs(merge)
             if queue in self.junctions:
                 self._link_all(sources, End(queue, "in_"))
 
-    def _output(self, name: str) -> _Source:
+    def _outputs(self, name: str) -> list[_Source]:
         junction = self.junctions[name]
-        return _Source(End(name, junction.output.prefix), _names(junction.frame))
+        return [_Source(End(name, side.prefix), _names(junction.frame)) for side in junction.outputs]
 
     def _link_all(self, sources: Iterable[_Source], sink: End) -> None:
         for source in sources:

@@ -16,6 +16,7 @@ from itertools import chain
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.noc import network as noc
 from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.naming import identifier
 
@@ -257,17 +258,18 @@ class Connection:
 
 @dataclass(frozen=True)
 class Junction:
-    """A unit between connections: the merge of messages from several sources, or a queue of messages to a reader.
+    """A unit between connections: a merge of messages, a queue of messages to a reader, or a topic of the exchange.
 
     `block` is its name in the top level, and `topic` the name of the topic whose messages pass, if there is one. A
-    merge has two or more `sources`; a queue has one, and up to `depth` messages of fixed size. `frame` is the message
-    with the fields that the sinks use.
+    merge has two or more `sources`; a queue has one, and up to `depth` messages of fixed size. In the exchange, each of
+    the `sources` reaches each of the `readers`. `frame` is the message with the fields that the sinks use.
     """
 
     block: str
     frame: Frame
     topic: str = ""
     sources: int = 1
+    readers: int = 0
     depth: int = 0
     overflow: Overflow = Overflow.BLOCK
     length: PayloadLength | None = None
@@ -275,13 +277,46 @@ class Junction:
     @property
     def inputs(self) -> tuple[MessageSide, ...]:
         """The inputs, numbered if there are several."""
-        prefixes = ["in_"] if self.sources == 1 else [f"in{number}_" for number in range(self.sources)]
-        return tuple(MessageSide(prefix, self.frame) for prefix in prefixes)
+        return tuple(MessageSide(prefix, self.frame) for prefix in _numbered("in", self.sources))
+
+    @property
+    def outputs(self) -> tuple[MessageSide, ...]:
+        """The outputs, numbered if there are several."""
+        return tuple(MessageSide(prefix, self.frame, self.length) for prefix in _numbered("out", max(1, self.readers)))
 
     @property
     def output(self) -> MessageSide:
-        """The output."""
-        return MessageSide("out_", self.frame, self.length)
+        """The only output of a merge or a queue, or the first one."""
+        return self.outputs[0]
+
+    @property
+    def is_exchanged(self) -> bool:
+        """Whether the messages pass the exchange."""
+        return self.readers > 0
+
+
+def _numbered(side: str, count: int) -> list[str]:
+    return [f"{side}_"] if count == 1 else [f"{side}{number}_" for number in range(count)]
+
+
+@dataclass(frozen=True)
+class ExchangeEnd:
+    """An endpoint of the exchange at a block: where the block's messages enter, and where it receives messages.
+
+    `source` is an input and `sink` an output of a junction; one of them may be missing.
+    """
+
+    block: str
+    source: End | None = None
+    sink: End | None = None
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """The routers through which topics pass, with what is at each of the network's endpoints."""
+
+    network: noc.Network
+    ends: tuple[ExchangeEnd, ...]
 
 
 @dataclass(frozen=True)
@@ -474,7 +509,8 @@ class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
     The messages of `services` and `actions` have converters, but no topics. `junctions` are the merges and queues
-    between connections, and `inner_topics` the topics between the system's own blocks.
+    between connections, and `inner_topics` the topics between the system's own blocks;
+    some of these may pass the `exchange`.
 
     `clock` is the frequency of clk in Hz, or None. If `watchdog` is not 0, a publisher that stops in the middle of a
     frame is cut off after `watchdog` cycles.
@@ -508,6 +544,7 @@ class DerivedSystem:
     network: Network | None = None
     junctions: tuple[Junction, ...] = ()
     inner_topics: tuple[InnerTopic, ...] = ()
+    exchange: Exchange | None = None
 
     @property
     def id_bytes(self) -> int:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from fusesoc_firm.converter.vhdl import index_bits, vhdl_type
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.derived.sides import SidePort
+from fusesoc_firm.system.hardware.exchange import exchange_instance
 from fusesoc_firm.system.hardware.instances import (
     ERROR_CODE_BITS,
     accelerator_instance,
@@ -67,7 +68,10 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         "subscribers": [subscriber_instances(names, converter, system) for converter in system.subscribers],
         "publishers": [publisher_instances(names, converter, system) for converter in system.publishers],
         "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
-        "junctions": [junction_configuration(names, junction, system) for junction in system.junctions],
+        "junctions": [
+            *(junction_configuration(names, item, system) for item in system.junctions if not item.is_exchanged),
+            *exchange_instance(names, system),
+        ],
         "pins": pin_groups(names, system),
         "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
         "connections": connections(names, system),

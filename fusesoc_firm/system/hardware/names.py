@@ -49,6 +49,9 @@ ERROR_WORDS = ("error", "error_code")
 # The levels and data of all sources of a merge, and those of its sink.
 MERGE_WORDS = tuple(f"{side}_{word}" for side in ("source", "sink") for word in ("fields", "offers", "takes"))
 QUEUE_WORDS = ("source_fields", "sink_fields")
+# The exchange, with the messages of all publishers and readers.
+EXCHANGE = ("", "exchange")
+EXCHANGE_WORDS = tuple(f"{side}_{word}" for side in ("source", "sink") for word in ("fields", "valid", "ready"))
 # Between a publisher and the FIFO for late frames.
 LATE_WORDS = (*AXIS, "tuser")
 
@@ -116,6 +119,10 @@ class Names:
         """Return a signal with the fields or levels of all sides of a junction in one direction."""
         return self._signals[junction.block, "", f"all_{word}"]
 
+    def exchange(self, word: str) -> str:
+        """Return a signal with the fields, `valid` or `ready` of all messages to or from the exchange."""
+        return self._signals[*EXCHANGE, word]
+
     def late(self, block: str, signal: str) -> str:
         """Return a signal between a publisher and its FIFO for late frames."""
         return self._signals[block, "", f"late_{signal}"]
@@ -131,7 +138,10 @@ def _entities(system: DerivedSystem) -> Iterator[str]:
 
 def _labels(system: DerivedSystem) -> Iterator[_Key]:
     """Yield the words of the labels of all instances."""
-    yield from (("u", block) for block, _ in blocks(system))
+    exchanged = {item.block for item in system.junctions if item.is_exchanged}
+    yield from (("u", block) for block, _ in blocks(system) if block not in exchanged)
+    if system.exchange:
+        yield "u", *EXCHANGE
     yield from (("u", *_fork_key(end, fork, "fork")) for end, fork in _forks(system))
     for item in system.connections:
         if item.length and item.length.source is LengthSource.COMPUTED:
@@ -166,8 +176,10 @@ def _signals(system: DerivedSystem) -> Iterator[_Key]:
         if item.late_bytes:
             yield from ((item.block, "", f"late_{word}") for word in LATE_WORDS)
     for junction in system.junctions:
-        words = MERGE_WORDS if junction.sources > 1 else QUEUE_WORDS
+        words = () if junction.is_exchanged else MERGE_WORDS if junction.sources > 1 else QUEUE_WORDS
         yield from ((junction.block, "", f"all_{word}") for word in words)
+    if system.exchange:
+        yield from ((*EXCHANGE, word) for word in EXCHANGE_WORDS)
     yield from ((block.block, str(pin.name), "synced") for block, pin in synchronised_pins(system))
     yield from (_length_key(item.source) for item in system.connections if is_found_out(item))
     for crossing in all_crossings(system):
@@ -210,7 +222,7 @@ def junction_ports(junction: Junction, width: int) -> list[tuple[str, SidePort]]
         for side in junction.inputs
         for port in side_ports(side.frame, width, gives=False, has_valid=True)
     ]
-    return taken + [(junction.output.prefix, port) for port in given_ports(junction, width)]
+    return taken + [(side.prefix, port) for side in junction.outputs for port in given_ports(junction, width)]
 
 
 def given_ports(junction: Junction, width: int) -> list[SidePort]:

@@ -234,6 +234,7 @@ def _converter(converter: Converter) -> list[str]:
 
 def _junction(junction: Junction) -> list[str]:
     kind = f"queue: {junction.depth} messages" if junction.depth else f"merge of {junction.sources}"
+    kind = f"exchange: {junction.sources} to {junction.readers}" if junction.is_exchanged else kind
     return [kind, *([junction.topic] if junction.topic else []), str(junction.frame.message)]
 
 

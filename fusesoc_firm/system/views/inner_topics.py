@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from fusesoc_firm.system.derived.model import DerivedSystem, InnerTopic, Junction, Overflow
+from fusesoc_firm.system.derived.model import DerivedSystem, Exchange, InnerTopic, Junction, Overflow
+from fusesoc_firm.system.hardware.exchange import described
 
 
 def ways_of_topics(system: DerivedSystem) -> list[str]:
     """Return a line for each topic that the system both publishes and subscribes to, and for each merged input."""
-    return [*map(_merged, _merges(system)), *(_way(topic, system.junctions) for topic in system.inner_topics)]
+    return [*map(_merged, _merges(system)), *(_way(topic, system) for topic in system.inner_topics)]
 
 
 def topics_description(system: DerivedSystem) -> dict[str, Any]:
@@ -20,6 +21,8 @@ def topics_description(system: DerivedSystem) -> dict[str, Any]:
         found["Topics"] = [_topic(topic) for topic in system.inner_topics]
     if system.junctions:
         found["Junctions"] = [_junction(item) for item in system.junctions]
+    if system.exchange:
+        found["Exchange"] = _exchange(system.exchange)
     return found
 
 
@@ -43,10 +46,10 @@ def _merged(found: tuple[str, Sequence[str]]) -> str:
     return f"input of {sink}: {', '.join(sources)} by a merge, since each of them provides the whole message"
 
 
-def _way(topic: InnerTopic, junctions: Iterable[Junction]) -> str:
+def _way(topic: InnerTopic, system: DerivedSystem) -> str:
     if not topic.readers:
         return f"topic {topic.name}: by the host, because of {topic.reason}"
-    kinds = [_kind(item) for item in junctions if item.topic == topic.name]
+    kinds = [_kind(item, system) for item in system.junctions if item.topic == topic.name]
     parts = [f"{', '.join(topic.publishers)} -> {', '.join(topic.readers)} within the FPGA" + _by(kinds)]
     inner = [item for item in topic.publishers if item not in topic.to_host]
     if topic.to_host:
@@ -62,7 +65,9 @@ def _by(kinds: Sequence[str]) -> str:
     return f" by {', '.join(kinds)}" if kinds else " by wires"
 
 
-def _kind(junction: Junction) -> str:
+def _kind(junction: Junction, system: DerivedSystem) -> str:
+    if junction.is_exchanged and system.exchange:
+        return f"the exchange, {described(system.exchange)}"
     if junction.depth:
         return f"a queue of {junction.depth} messages ({junction.block})"
     return f"a merge of {junction.sources} sources ({junction.block})"
@@ -76,10 +81,28 @@ def _topic(topic: InnerTopic) -> dict[str, Any]:
     return found | ({"byHost": topic.reason} if topic.reason else {})
 
 
+def _exchange(exchange: Exchange) -> dict[str, Any]:
+    network = exchange.network
+    return {
+        "topology": network.topology.kind,
+        "routers": network.topology.routers,
+        "turns": sum(map(len, network.turns)),
+        "endpoints": [
+            {
+                "block": end.block,
+                "router": router,
+                **({"sends": end.source.block} if end.source else {}),
+                **({"receives": end.sink.block} if end.sink else {}),
+            }
+            for end, router in zip(exchange.ends, network.places, strict=True)
+        ],
+    }
+
+
 def _junction(junction: Junction) -> dict[str, Any]:
     found: dict[str, Any] = {"block": junction.block, "nameMW": str(junction.frame.message)}
     found |= {"topic": junction.topic} if junction.topic else {}
     if not junction.depth:
-        return found | {"sources": junction.sources}
+        return found | {"sources": junction.sources, **({"readers": junction.readers} if junction.readers else {})}
     drops = {} if junction.overflow is Overflow.BLOCK else {"overflow": junction.overflow.value}
     return found | {"queue": junction.depth, **drops}

@@ -73,6 +73,9 @@ PROFILES = {
     "services_default": (RELIABLE, VOLATILE, 10),
     "action_status_default": (RELIABLE, TRANSIENT_LOCAL, 1),
 }
+# The ways of messages within the FPGA: as wires, or by an exchange of routers with a topology.
+WIRED = AUTO_FABRIC, WIRES = ("auto", "wires")
+TOPOLOGIES = ("crossbar", "mesh", "concentrated_mesh", "chain", "tree", "ring", "torus")
 # The ways of a topic that the system both publishes and subscribes to.
 FABRIC, HOST, BOTH = DELIVERIES = ("fabric", "host", "both")
 PASS = "pass"
@@ -231,6 +234,13 @@ class Project(Section):
         "register stages of subscribers of variable size (default: none; if clock is above 100 MHz, borders at 8"
         " bits and full at more; full for messages with more than 256 bytes of fields)",
         choices=PIPELINES,
+        is_asked=False,
+    )
+    fabric: Text = key(
+        "the way of topics within the FPGA: as wires, or by an exchange with this topology; auto: wires, which need"
+        " fewer cells than any exchange",
+        choices=(*WIRED, *TOPOLOGIES),
+        default=Text(AUTO_FABRIC),
         is_asked=False,
     )
     interconnect: Text = key(

@@ -16,6 +16,7 @@ DATA = Path(__file__).parent / "data"
 RUNTIME = (
     "axis/package",
     "axis/axis",
+    "noc/noc",
     "sim/sync",
     "cdc/cdc",
     "cdc/debounce",

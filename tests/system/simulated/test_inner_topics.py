@@ -158,7 +158,7 @@ class Case:
     model: str = ""
     project: Mapping[str, Any] = field(default_factory=dict)
 
-    def build(self, folder: Path, width: int) -> GeneratedSystem:
+    def build(self, folder: Path, width: int, **project: Any) -> GeneratedSystem:
         names = {str(block["type"]) for block in self.blocks if "type" in block}
         types = []
         for name in sorted(names):
@@ -166,7 +166,7 @@ class Case:
             inputs = [side(), side()] if name in ("joining", "summing") else [side()]
             interface = {"input": inputs, "output": [side()]}
             types.append({"name": name, "type": "VHDL", "sources": f"{name}.vhd", "interface": interface})
-        spec = {"project": {"name": "inner", "width": width, **self.project}, "accelerators": types}
+        spec = {"project": {"name": "inner", "width": width, **self.project, **project}, "accelerators": types}
         (folder / "inner.yaml").write_text(yaml.safe_dump({**spec, "blocks": list(self.blocks)}, sort_keys=False))
         senders = tuple(self.answers)
         stimuli = [{senders[number % len(senders)]: {"data": 100 + number}} for number in range(COUNT)]
@@ -341,12 +341,26 @@ def test_every_reader_answers_every_message(tmp_path: Path, case: str, width: in
         assert system.passes(SEED=seed, STALL_PERCENT=stalls)
 
 
-@pytest.mark.parametrize("width", [8, 64])
-def test_the_netlist_does_the_same_and_has_no_latch(tmp_path: Path, width: int) -> None:
-    system = TWO_TO_TWO.build(tmp_path, width)
+@pytest.mark.parametrize(("width", "fabric"), [(8, "wires"), (64, "wires"), (8, "mesh"), (64, "crossbar")])
+def test_the_netlist_does_the_same_and_has_no_latch(tmp_path: Path, width: int, fabric: str) -> None:
+    system = TWO_TO_TWO.build(tmp_path, width, fabric=fabric)
     assert system.work.latches(system.entity) == []
     system.replace_by_netlist()
     assert system.passes(SEED=4, STALL_PERCENT=30)
+
+
+FABRICS = ["crossbar", "mesh", "chain"]
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("width", [8, 64])
+@pytest.mark.parametrize("fabric", FABRICS)
+@pytest.mark.parametrize("case", ["2:1", "2:2", "pipeline", "with host", "three clocks", "a reader that takes nothing"])
+def test_an_exchange_answers_every_message(tmp_path: Path, case: str, fabric: str, width: int) -> None:
+    system = CASES[case].build(tmp_path, width, fabric=fabric)
+    assert (tmp_path / "work" / "inner_system_exchange.vhd").is_file()
+    for seed, stalls in ((1, 0), (2, 25), (3, 70)):
+        assert system.passes(SEED=seed, STALL_PERCENT=stalls)
 
 
 # --- messages of variable size ---------------------------------------------------------------------------------------

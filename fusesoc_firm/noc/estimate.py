@@ -1,0 +1,51 @@
+"""The cells and cycles of messages' ways: LUT4 of an ECP5, from measurements of many sizes (docs/figures/noc.md)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+
+from fusesoc_firm.noc.network import Flow, Network
+
+# LUT4 for each bit of a beat: of a buffer, and of a further source of an output; and for each further source itself.
+_BUFFER_BIT, _TURN_BIT, _TURN = 1.0, 0.6, 8.0
+# LUT4 of a sender beside one for each bit of its messages, and of a source of a merge beside those for its bits.
+_SENDER, _SOURCE = 15, 6
+
+
+def merge_lut(sources: int, bits: int) -> int:
+    """Return the estimated LUT4 of `firm_message_merge`.
+
+    A LUT chooses among two sources, and one joins three of these choices with a fourth one.
+    """
+    pairs, single = divmod(sources, 2)
+    return bits * (pairs + -(-(pairs + single - 1) // 3)) + _SOURCE * sources
+
+
+def sender_lut(bits: int) -> int:
+    """Return the estimated LUT4 of `firm_message_send`."""
+    return bits + _SENDER
+
+
+def routers_lut(network: Network, width: int) -> int:
+    """Return the estimated LUT4 of all routers for streams of `width` bits, of which all beats are full."""
+    bits = width + 1 + max(1, (network.endpoints - 1).bit_length())
+    total = 0.0
+    for turns in network.turns:
+        total += _BUFFER_BIT * bits * len({source for source, _ in turns})
+        sources = Counter(sink for _, sink in turns)
+        total += sum((_TURN + _TURN_BIT * bits) * (count - 1) for count in sources.values())
+    return round(total)
+
+
+def delay(network: Network, flow: Flow, sink: int) -> int:
+    """Return the most cycles of a beat through the routers to one of a flow's sinks, if nothing else is under way.
+
+    A router takes a cycle, a further one if its output turns to another input first, and one if it copies the beat.
+    """
+    total = int(len(flow.sinks) > 1)
+    for channel, following in pairwise(network.channels(flow.source, sink)):
+        router = channel.sink.number
+        output = network.ports[router].index(following.sink)
+        total += 1 + (sum(sink == output for _, sink in network.turns[router]) > 1)
+    return total
