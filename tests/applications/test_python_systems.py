@@ -156,3 +156,41 @@ class _State:
 
     def __init__(self, **fields: list[float]) -> None:
         self.__dict__.update(fields)
+
+
+def test_a_command_turns_to_what_is_seen() -> None:
+    """A bright square in rows of 32 pixels, first on the left, then on the right, and seen ever more clearly."""
+    folder = SPECS / "perception" / "python"
+
+    def function(file: str, name: str, *messages: str) -> Callable[..., Any]:
+        loaded = load_compiled(folder / file, name, name, ("m", "n"), "float32")
+        frames = [frame_of(parse_name(item), _LIBRARY.closure(parse_name(item))) for item in messages]
+
+        def answer(*contents: Any) -> Any:
+            with silent():
+                return loaded.call(
+                    *(typed(frame, item, "float32") for frame, item in zip(frames, contents, strict=True))
+                )
+
+        return answer
+
+    image, point, number, twist = "sensor_msgs/Image", "geometry_msgs/Point", "std_msgs/Float32", "geometry_msgs/Twist"
+    edges, regions, contrast = (function("vision.py", name, image) for name in ("edges", "regions", "contrast"))
+    smoothing, tracker = function("motion.py", "smoothing", point), function("motion.py", "tracker", point)
+    gain, control = function("motion.py", "gain", number), function("motion.py", "control", twist, number)
+
+    def command(left: int, value: int) -> tuple[Any, Any]:
+        pixels = [value if left <= column < left + 4 else 0 for _ in range(8) for column in range(32)]
+        found = edges({"header": {}, "height": 8, "width": 32, "step": 32, "data": pixels})
+        place = regions(found)
+        # The edges of a square are at its first column and at the one after it.
+        assert (place["x"], place["y"]) == (left + 2, 3.5)
+        return control(tracker(smoothing(place)), gain(contrast(found))), place
+
+    for _ in range(8):
+        left, _ = command(4, 100)
+    for _ in range(8):
+        right, _ = command(24, 100)
+    brighter, _ = command(24, 200)
+    assert left["angular"]["z"] > 0 > right["angular"]["z"] > brighter["angular"]["z"]
+    assert left["linear"]["x"] > 0

@@ -76,6 +76,7 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
         ("inverse_kinematics", 8),
         ("cloud_occupancy", 5),
         ("state_kalman", 12),
+        ("perception", 20),
         ("quat2euler_python", 16),
     ],
 )
