@@ -37,6 +37,7 @@ _MODULES = {
     "system": "system",
     "scheduler": "scheduler",
     "accelerator": "accelerator",
+    "fabric": "fabric",
     "test": "test",
     "build": "build",
     "emulate": "emulate",

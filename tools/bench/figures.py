@@ -147,7 +147,7 @@ _METHODS = {
     "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "passing": """The message side of a subscriber is wired to the publisher of the same message. Neither the source of
         frames nor their sink pauses. GHDL simulates both, and the cycles are counted.""",
-    "inner_topics": """Topics [within the FPGA](../reference/connections.md#topics-within-the-fpga) are compared with
+    "inner_topics": """Topics [within the FPGA](../reference/inner-topics.md) are compared with
         the same topics by a host. GHDL simulates both.""",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the

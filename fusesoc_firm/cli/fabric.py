@@ -1,0 +1,61 @@
+"""`firm fabric`: the ways of topics within the FPGA."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import add_json, add_sources, add_spec, command, load, print_json
+from fusesoc_firm.text.diagnostics import fail
+
+
+def add_fabric(commands: Any) -> None:
+    """Declare the command and its actions."""
+    fabric = command(commands, "fabric", "show the ways of topics within the FPGA", "firm fabric show robot.yaml")
+    actions = fabric.add_subparsers(title="actions", metavar="ACTION", required=True)
+    show = command(
+        actions,
+        "show",
+        "show the ways of topics within the FPGA, what other ways would cost, and the map of the exchange",
+        "firm fabric show robot.yaml --map robot.svg",
+        _show,
+    )
+    add_spec(show)
+    add_sources(show)
+    show.add_argument(
+        "--map", type=Path, metavar="F.svg", help="write the map of the exchange; .png, .pdf and .dot are legal, too"
+    )
+    add_json(show)
+
+
+def _show(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.exploration.fabrics import fabrics
+    from fusesoc_firm.exploration.fabrics_text import fabrics_text, map_picture, map_text
+    from fusesoc_firm.system.hardware.exchange import described
+    from fusesoc_firm.system.views.inner_topics import topics_description, ways_of_topics
+    from fusesoc_firm.system.written.specification import WIRED, WIRES
+    from fusesoc_firm.tools.pictures import check_picture, draw
+
+    check_picture(arguments.map, None)
+    loaded = load(arguments)
+    exchange = loaded.system.exchange
+    written = str(loaded.specification.project.fabric)
+    found = fabrics(loaded)
+    if arguments.map:
+        if not exchange:
+            fail("--map draws the routers of an exchange", hint="add 'fabric: crossbar' or another one to 'project'")
+        draw(map_picture(loaded.system.name, exchange), arguments.map, None)
+    chosen = WIRES if written in WIRED or not exchange else written
+    if arguments.json:
+        ways = [item.data() for item in found]
+        print_json({"fabric": chosen, "ways": ways, **topics_description(loaded.system)})
+        return
+    for line in ways_of_topics(loaded.system) or ["no topic is within the FPGA"]:
+        print(line)
+    if len(found) > 1:
+        print(f"\nways, estimated for an ECP5, with streams of {loaded.system.width} bits; *: the specification's")
+        print("\n".join(fabrics_text(found, chosen)))
+    if exchange:
+        print(f"\n{described(exchange)}")
+        print("\n".join(map_text(exchange)))

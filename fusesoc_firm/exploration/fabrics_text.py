@@ -1,0 +1,109 @@
+"""The ways of topics within the FPGA as text of at most 100 columns, and the map of an exchange as text and picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from fusesoc_firm.exploration.fabrics import Fabric
+from fusesoc_firm.exploration.tables import WIDTH, aligned, cut
+from fusesoc_firm.noc.network import Network
+from fusesoc_firm.system.derived.model import Exchange
+from fusesoc_firm.system.hardware.exchange import described
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.quoting import dot_markup
+
+_HEAD = ("way", "LUT4", "FF", "routers", "turns", "hops", "cycles", "interval")
+
+
+def fabrics_text(found: Sequence[Fabric], chosen: str) -> Iterator[str]:
+    """Yield the lines of a table of ways; the one that the system uses is marked."""
+    possible = [item for item in found if not item.fault]
+    yield from aligned([("", *_HEAD), *(("*" if item.name == chosen else "", *_row(item)) for item in possible)], 2)
+    for item in found:
+        if item.fault:
+            yield cut(f"{item.name}: not possible: {item.fault}", WIDTH)
+
+
+def _row(fabric: Fabric) -> tuple[str, ...]:
+    data = fabric.data()
+    hops = f"{data['hops']:.2f}" if "hops" in data else ""
+    return (
+        fabric.name,
+        *(str(data.get(word, "")) for word in ("lut", "ff", "routers", "turns")),
+        hops,
+        str(fabric.cycles),
+        str(fabric.interval),
+    )
+
+
+def map_text(exchange: Exchange) -> Iterator[str]:
+    """Yield the lines of a map: the routers with the blocks at them; a grid as a grid."""
+    network = exchange.network
+    if network.topology.columns > 1:
+        yield from _grid(network, _blocks_at(exchange))
+        return
+    after: dict[int, list[int]] = {}
+    for source, sink in _links(network):
+        after.setdefault(source, []).append(sink)
+    for router, blocks in enumerate(_blocks_at(exchange)):
+        ways = f" -> router {', '.join(map(str, after[router]))}" if router in after else ""
+        yield cut(f"router {router}: {', '.join(blocks) or '-'}{ways}", WIDTH)
+
+
+def _links(network: Network) -> list[tuple[int, int]]:
+    """Return the links between routers that flows use."""
+    ways = network.ways.values()
+    return sorted({link for way in ways for link in pairwise(way)})
+
+
+def _blocks_at(exchange: Exchange) -> list[list[str]]:
+    """Return the blocks at each router."""
+    found: list[list[str]] = [[] for _ in range(exchange.network.topology.routers)]
+    for end, router in zip(exchange.ends, exchange.network.places, strict=True):
+        found[router].append(end.block)
+    return found
+
+
+def _grid(network: Network, blocks: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield the lines of a grid of routers, with a line where a link is used."""
+    columns = network.topology.columns
+    width = max(3, *(len(name) for names in blocks for name in (*names, "")))
+    height = max(1, *(len(names) for names in blocks))
+    links = {frozenset(link) for link in _links(network)}
+    for first in range(0, len(blocks), columns):
+        row = range(first, min(first + columns, len(blocks)))
+        for line in range(height):
+            cells = [(f"{blocks[at][line]}" if line < len(blocks[at]) else "" if line else "-") for at in row]
+            parts = [f"[{cell:^{width}}]" for cell in cells]
+            text = parts[0]
+            for at, part in zip(row, parts[1:], strict=False):
+                text += ("--" if frozenset((at, at + 1)) in links and line == 0 else "  ") + part
+            yield text.rstrip()
+        if first + columns < len(blocks):
+            marks = [("|" if frozenset((at, at + columns)) in links else " ") for at in row]
+            yield "  ".join(f"{mark:^{width + 2}}" for mark in marks).rstrip()
+
+
+def map_picture(name: str, exchange: Exchange) -> str:
+    """Return the map in Graphviz's language DOT; raise `InputError` if the package graphviz is missing."""
+    try:
+        import graphviz
+    except ModuleNotFoundError:
+        fail("pictures require the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
+    network = exchange.network
+    columns = network.topology.columns or network.topology.routers
+    text = {"fontname": "sans-serif", "fontsize": "10"}
+    graph = graphviz.Digraph(name, node_attr={**text, "shape": "box", "margin": "0.08,0.05"}, edge_attr=text)
+    graph.attr(label=f"{name}: {described(exchange)}", rankdir="TB", **text)
+    for router, blocks in enumerate(_blocks_at(exchange)):
+        lines = [f"router {router}", *blocks]
+        graph.node(f"r{router}", f"<{'<br/>'.join(map(dot_markup, lines))}>", style="filled", fillcolor="#eaeef2")
+    for first in range(0, network.topology.routers, columns):
+        with graph.subgraph() as row:
+            row.attr(rank="same")
+            for router in range(first, min(first + columns, network.topology.routers)):
+                row.node(f"r{router}")
+    for source, sink in _links(network):
+        graph.edge(f"r{source}", f"r{sink}")
+    return str(graph.source)
