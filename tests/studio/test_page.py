@@ -138,6 +138,28 @@ def test_shipped_systems_are_drawn(tmp_path: Path, name: str) -> None:
     run(path, tmp_path, steps)
 
 
+def test_topics_within_the_fpga_are_drawn(tmp_path: Path) -> None:
+    """A wire for each publisher and reader; converters whose messages stay have no stream to the Manager."""
+    path = SPECS / "perception" / "perception.yaml"
+
+    async def steps(page: Page) -> None:
+        await page.until("document.querySelectorAll('.svelte-flow__edge.topic').length === 8")
+        labels = await page.evaluate(
+            "[...document.querySelectorAll('.svelte-flow__edge.topic')].map(edge => edge.ariaLabel).sort()"
+        )
+        assert labels[2:4] == [
+            "topic /edges from edges_out to contrast_in",
+            "topic /edges from edges_out to regions_in",
+        ]
+        # The image, the command and the speed.
+        assert await page.evaluate("document.querySelectorAll('.svelte-flow__edge.stream').length") == 3
+        for name, words in (("trust_in", "within the FPGA"), ("control_out", "id 0, ")):
+            text = await page.evaluate(f"document.querySelector({json.dumps(block(name))}).textContent")
+            assert words in text
+
+    run(path, tmp_path, steps)
+
+
 @pytest.mark.parametrize("path", ["arm/arm", "planner/planner", "camera/camera", "camera/asking"])
 def test_a_loop_of_two_blocks_hides_no_wire(tmp_path: Path, path: str) -> None:
     """A block of an action or a service and its accelerator: no wire is below a block, or along another wire."""

@@ -7,8 +7,11 @@ import { FROM_HOST, HOST, TO_HOST, wireKey } from "./waits";
 
 export type Kind = "subscriber" | "publisher" | "service" | "accelerator" | "software" | "manager";
 
-/** What a block shows: a converter the values of its `topics`, a side of the Manager the waits on its wire to the host. */
-export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path; file: string; topics?: string[]; wire?: WireData };
+/**
+ * What a block shows: a converter the values of its `topics`, a side of the Manager the waits on its wire to the host.
+ * Messages of a converter that is `isWithin` stay within the FPGA.
+ */
+export type BlockWords = { kind: Kind; name: string; lines: string[]; path: Path; file: string; topics?: string[]; wire?: WireData; isWithin?: boolean };
 export type BlockData = BlockWords & { errors: number; warnings: number };
 
 /** A stream or a connection of hardware: its wire, and on a stream the converter, with the name of its end if it has one. */
@@ -45,6 +48,7 @@ const [FACTS_WIDTH, LEAST_WIDTH, MOST_WIDTH] = [176, 150, 360];
 // The characters of an accelerator's ports that are in one line.
 const LONGEST_PORTS = 28;
 const FACTS = "...";
+const WITHIN = "within the FPGA";
 // The border and the space beside the texts of a block.
 export const SIDES = 34;
 // The converters of a service and of an action by their ends: what a server takes from the Manager, and what it gives.
@@ -73,9 +77,21 @@ function factsOf(block: Section, derived: Section | null): string {
   const converters = Object.values(derived?.Converters ?? {}).flat() as Section[];
   const { taken, given } = convertersOf(block);
   const own = [...taken, ...given].flatMap(({ name }) => converters.filter((item) => item.block === name));
-  if (!own.length) return FACTS;
+  if (!own.length) return withinOf(derived).has(block.name) ? WITHIN : FACTS;
   return isCalled(block) ? `ids ${own.map((item) => item.id).join(", ")}` : `id ${own[0].id}, ${own[0].payloadBytes} bytes`;
 }
+
+/** The topics between blocks of the system. */
+const innerOf = (derived: Section | null): Section[] => list(derived?.Topics).filter((topic) => topic.readers);
+
+/** The converters whose messages all stay within the FPGA. */
+const withinOf = (derived: Section | null) =>
+  new Set<string>(
+    innerOf(derived).flatMap(({ publishers, readers, toHost, fromHost }) => [
+      ...list(publishers).filter((name) => !list(toHost).includes(name)),
+      ...list(readers).filter((name) => !list(fromHost).includes(name)),
+    ]),
+  );
 
 /** Whether a block is the server or the client of a service or an action. */
 const isCalled = (block: Section) => block.mode === "server" || block.mode === "client";
@@ -150,11 +166,12 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
   const specification = scene.specification ?? {};
   const project = specification.project ?? {};
   const blocks = list(specification.blocks);
+  const within = withinOf(derived);
   const nodes = blocks.map((block, index) => {
     const path = ["blocks", index];
-    const data = { kind: kindOf(specification, block ?? {}), name: String(block?.name ?? `block ${index + 1}`) };
+    const data = { kind: kindOf(specification, block ?? {}), name: String(block?.name ?? `block ${index + 1}`), isWithin: within.has(block?.name) };
     const { taken, given } = convertersOf(block ?? {});
-    const topics = block?.mode ? [...taken, ...given].map((item) => item.name) : undefined;
+    const topics = block?.mode && !data.isWithin ? [...taken, ...given].map((item) => item.name) : undefined;
     return nodeOf(`block:${index}`, { ...data, lines: linesOf(block ?? {}, specification, derived), path, file: scene.file, topics }, faultsAt(scene.faults, path));
   });
   const manager = (id: string, name: string, wire: string, lines: string[], faults: Fault[]) =>
@@ -171,8 +188,9 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
       const ends = converters.map(({ name, end }) => ({ wire: wire(name), block: name, title: titled ? end : undefined }));
       return { file: scene.file, ends };
     };
-    if (taken.length) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, streams(taken, (name) => wireKey(FROM_HOST, name))));
-    if (given.length) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", streams(given, (name) => wireKey(name, TO_HOST))));
+    const passesHost = !within.has(block?.name);
+    if (taken.length && passesHost) edges.push(fixed(`in:${index}`, "manager:in", `block:${index}`, streams(taken, (name) => wireKey(FROM_HOST, name))));
+    if (given.length && passesHost) edges.push(fixed(`out:${index}`, `block:${index}`, "manager:out", streams(given, (name) => wireKey(name, TO_HOST))));
     list(block?.outgoing).forEach((way, number) => {
       const sink = blocks.findIndex((other) => other?.name === way?.name);
       if (sink < 0) return;
@@ -194,7 +212,24 @@ export function graphOf(scene: Scene, derived: Section | null): { nodes: BlockNo
       });
     });
   });
-  return { nodes, edges };
+  return { nodes, edges: [...edges, ...topicsOf(scene.file, blocks, derived)] };
+}
+
+/** The topics within the FPGA as wires from each publisher to each reader, which show what the blocks beside them say. */
+function topicsOf(file: string, blocks: any[], derived: Section | null): Edge[] {
+  const feeding = (name: string) => blocks.filter((block) => list(block?.outgoing).some((way) => way?.name === name));
+  const indexOf = (name: string) => blocks.findIndex((block) => block?.name === name);
+  return innerOf(derived).flatMap(({ topic, publishers, readers }) =>
+    list(publishers).flatMap((publisher) =>
+      list(readers).flatMap((reader): Edge[] => {
+        const [source, target] = [indexOf(publisher), indexOf(reader)];
+        if (source < 0 || target < 0) return [];
+        const ends = feeding(publisher).flatMap((block) => list(blocks[target]?.outgoing).map((way) => ({ wire: wireKey(block.name, way?.name) })));
+        const wire = fixed(`topic:${source}:${target}`, `block:${source}`, `block:${target}`, { file, ends });
+        return [{ ...wire, class: "topic", label: topic, ariaLabel: `topic ${topic} from ${publisher} to ${reader}` }];
+      }),
+    ),
+  );
 }
 
 /** A converter; of a service or an action, with the word for its end. */
@@ -265,7 +300,7 @@ export async function laidOut(nodes: BlockNode[], edges: Edge[]): Promise<BlockN
   const ways = new Set(edges.map(({ source, target }) => `${source} ${target}`));
   const graph = await layout({
     children: [...own.values()].map(({ id, width, height, data }) => {
-      const layer = { subscriber: "FIRST", publisher: "LAST" }[data.kind as string] ?? "NONE";
+      const layer = data.isWithin ? "NONE" : ({ subscriber: "FIRST", publisher: "LAST" }[data.kind as string] ?? "NONE");
       return { id, width, height, layoutOptions: { "elk.layered.layering.layerConstraint": layer } };
     }),
     edges: edges
