@@ -14,6 +14,8 @@ import pytest
 import yaml
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.system.written.specification import TOPOLOGIES
+from fusesoc_firm.text.diagnostics import InputError
 from tests.hdl.frames import write_stimulus
 from tests.hdl.verilator import simulator
 from tests.hdl.verilog import compile_verilog, translated
@@ -361,6 +363,79 @@ def test_an_exchange_answers_every_message(tmp_path: Path, case: str, fabric: st
     assert (tmp_path / "work" / "inner_system_exchange.vhd").is_file()
     for seed, stalls in ((1, 0), (2, 25), (3, 70)):
         assert system.passes(SEED=seed, STALL_PERCENT=stalls)
+
+
+# --- any system ------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Adder:
+    """An accelerator, the topics at its sides, and what a message of each subscriber has become behind it."""
+
+    amount: int
+    read: str
+    written: str
+    sums: list[tuple[str, int]]
+
+
+def random_case(source: random.Random) -> Case:
+    """Layers of accelerators that read topics of earlier layers; some topics have several publishers and readers."""
+    adders: dict[str, Adder] = {}
+    for layer in range(source.randint(2, 4)):
+        known = sorted({item.written for item in adders.values()})
+        own: list[str] = []
+        for place in range(source.randint(1, 3)):
+            name, amount = f"a{layer}{place}", source.randint(1, 9)
+            read = source.choice([*known, f"raw_{name}"])
+            before = [found for item in adders.values() if item.written == read for found in item.sums]
+            own.append(source.choice([*own, f"t{layer}{place}"]))
+            sums = [(entry, total + amount) for entry, total in before or [(f"{name}_in", 0)]]
+            adders[name] = Adder(amount, read, own[-1], sums)
+    all_read = {item.read for item in adders.values()}
+    blocks: list[dict[str, Any]] = []
+    answers: dict[str, list[tuple[str, int]]] = {entry: [] for item in adders.values() for entry, _ in item.sums}
+    for name, item in adders.items():
+        is_inner = not item.read.startswith("raw")
+        queue: dict[str, Any] = {"queue": source.randint(1, 4)} if is_inner and source.random() < 0.4 else {}
+        stays = item.written in all_read and source.random() < 0.4 and name != "a00"
+        blocks += [
+            converter(f"{name}_in", "subscriber", item.read, name, **queue),
+            adding(name, item.amount, f"{name}_out"),
+            converter(f"{name}_out", "publisher", item.written, **({"deliver": "fabric"} if stays else {})),
+        ]
+        for entry, total in [] if stays else item.sums:
+            answers[entry].append((f"{name}_out", total))
+    model = (
+        f"ANSWERS = {answers!r}\n\n\ndef respond(subscriber, message):\n"
+        "    return [(name, {'data': message['data'] + more}) for name, more in ANSWERS[subscriber]]\n"
+    )
+    return Case(blocks, {name: dict(found) for name, found in answers.items()}, model)
+
+
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 500), marks=pytest.mark.thorough)])
+def test_random_systems_answer_every_message(tmp_path: Path, seeds: range) -> None:
+    """With every fabric; one that might stop is refused."""
+    passed = 0
+    for number in seeds:
+        source = random.Random(f"{SEED} {number}")
+        case = random_case(source)
+        fabric, width = source.choice(["wires", *TOPOLOGIES]), source.choice([8, 16, 32, 64, 128])
+        print(f"seed {SEED}, system {number}: {fabric}, {width} bits")
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        try:
+            system = case.build(folder, width, fabric=fabric)
+        except InputError as error:
+            fault = str(error)
+        else:
+            fault = ""
+        if fault:
+            assert "messages may wait for each other in the routers" in fault
+            assert fabric not in ("wires", "crossbar")
+            continue
+        assert system.passes(SEED=number + 1, STALL_PERCENT=source.choice([0, 25, 60]))
+        passed += 1
+    assert passed > len(seeds) / 2
 
 
 # --- messages of variable size ---------------------------------------------------------------------------------------
