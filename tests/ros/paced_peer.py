@@ -1,11 +1,12 @@
 """A node of rospy or rclpy that sends quaternions at a rate, and takes the time until something comes back.
 
-    python paced_peer.py 1|2 RATE SECONDS '[["in", "out"], ...]' [images]
+    python paced_peer.py 1|2 RATE SECONDS '[["in", "out"], ...]' [images|squares]
 
 Quaternion n of a topic turns by n thousandths of a rad about z, from -3 on, and around again behind 3. The result, as
 JSON: for each way how many were sent, the z of the points that came, and the seconds that each took, the n-th that came
 being the answer to the n-th that was sent. `echo IN OUT` in place of a rate is a node that answers with x, y and z of
-what comes. With `images`, images of 1 MB are sent and come back; z is the `step` of one, which is its number.
+what comes. With `images`, images of 1 MB are sent and come back; z is the `step` of one, which is its number. With
+`squares`, images of 32 by 8 pixels are sent, each with a square, and commands come back; z is the turn of one.
 """
 
 from __future__ import annotations
@@ -120,6 +121,24 @@ class Images:
         return float(image.step) if image.data == self._data else -1.0
 
 
+class Squares:
+    """Small images, which commands answer."""
+
+    def __init__(self) -> None:
+        from geometry_msgs.msg import Twist
+        from sensor_msgs.msg import Image
+
+        self.sent, self.received = Image, Twist
+
+    def message(self, number: int) -> Any:
+        columns = range(number % 28, number % 28 + 4)
+        pixels = bytes(200 if column in columns else 10 for _ in range(8) for column in range(32))
+        return self.sent(height=8, width=32, step=32, encoding="mono8", data=pixels)
+
+    def value(self, command: Any) -> float:
+        return float(command.angular.z)
+
+
 class Way:
     def __init__(self, ros: Any, kind: Any, sent: str, received: str) -> None:
         self.kind = kind
@@ -167,7 +186,8 @@ def echo(ros: Any, kind: Any, sent: str, received: str) -> None:
 
 if __name__ == "__main__":
     middleware: Any = {"1": Ros1, "2": Ros2}[sys.argv[1]]()
-    messages: Any = Images(int(sys.argv[1])) if sys.argv[5:] == ["images"] else Angles()
+    kinds: Any = {"": Angles, "images": lambda: Images(int(sys.argv[1])), "squares": Squares}
+    messages: Any = kinds["".join(sys.argv[5:])]()
     if sys.argv[2] == "echo":
         echo(middleware, messages, *sys.argv[3:5])
     else:

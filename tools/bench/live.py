@@ -52,6 +52,16 @@ blocks:
      maxLength: 2000000, outgoing: [{{name: image_out}}]}}
   - {{name: image_out, middleware: {ros}, mode: publisher, message: sensor_msgs/Image}}
 """
+TOPICS_TITLE = "Topics between eight accelerators"
+_TOPICS_NAMES = ("within the FPGA", "by the host")
+_TOPICS_RATE, _TOPICS_SECONDS = 20, 30.0
+_TOPICS_COLUMNS = ("topics", "sent", "lost", "median, ms", "99 %, ms", "worst - median, ms", "quotients")
+_TOPICS_NOTE = f"""
+    A peer of rclpy publishes images of 32 by 8 pixels at {_TOPICS_RATE} Hz for {_TOPICS_SECONDS:g} s and receives
+    commands of robot:sys:perception, which Verilator simulates at 32 bits. Times are measured from the publishing call
+    to the callback. Within the FPGA, one message enters and two leave; by the host, each of the seven topics passes ROS
+    ('deliver: host'). 'quotients' are those of the medians and of 'worst - median'.
+    """
 _WAY = ("/QuaternionToEuler_sub", "/QuaternionToEuler_pub")
 _IMAGE_WAY, _ECHO_WAY = ("/image_in", "/image_out"), ("/echo_sub", "/echo_pub")
 _TRACE = "trace.csv"
@@ -62,7 +72,7 @@ _TOLERANCE = 1e-9
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cell of every row, by table."""
     rows: list[tuple[str, ...]] = [(name,) for names in _NODES.values() for name in names]
-    return {TITLE: rows, IMAGES_TITLE: rows}
+    return {TITLE: rows, IMAGES_TITLE: rows, TOPICS_TITLE: [(name,) for name in _TOPICS_NAMES]}
 
 
 def versions() -> list[str]:
@@ -91,7 +101,61 @@ def measure(tell: Tell, written: str = "", pattern: str = "") -> list[Table]:
             for name in names:
                 known.setdefault((name,), (name, *[""] * (len(columns) - 2), NOT_MEASURED))
         tables.append(Table(title, columns, tuple(known[key] for key in keys()[title]), note))
-    return tables
+    known = known_rows(written, TOPICS_TITLE, _TOPICS_COLUMNS, keys=1)
+    if re.search(pattern, TOPICS_TITLE):
+        known |= {row[:1]: row for row in _topics(tell)}
+    rows = tuple(known.get(key, (*key, *[""] * 5, NOT_MEASURED)) for key in keys()[TOPICS_TITLE])
+    return [*tables, Table(TOPICS_TITLE, _TOPICS_COLUMNS, rows, _TOPICS_NOTE)]
+
+
+def _topics(tell: Tell) -> list[tuple[str, ...]]:
+    """The rows of topics within the FPGA and by the host."""
+    if reason := missing_ros(2):
+        tell(f"ROS 2: {reason}")
+        return []
+    found = {}
+    with tempfile.TemporaryDirectory() as name, running_ros(2, Path(name)) as ros:
+        for way in _TOPICS_NAMES:
+            folder = Path(name) / way.replace(" ", "_")
+            folder.mkdir()
+            spec = specification("perception", 2, folder)
+            if way == "by the host":
+                text = spec.read_text(encoding="utf-8").replace("deliver: fabric", "deliver: host")
+                text = text.replace("topic: command}", "topic: command, deliver: host}")
+                # Images that leave need a buffer, and a limit where they enter.
+                text = text.replace("topic: edges, deliver: host}", "topic: edges, deliver: host, buffer: 1024}")
+                spec.write_text(
+                    text.replace("topic: edges, out", "topic: edges, maxLength: 1024, out"), encoding="utf-8"
+                )
+            found[way] = _commands(ros, folder, spec)
+    rows = []
+    inner = found[_TOPICS_NAMES[0]]
+    for way, result in found.items():
+        middle, worst = _spread(result)
+        quotients = (
+            "" if way == _TOPICS_NAMES[0] else f"{middle / _spread(inner)[0]:.1f}, {worst / _spread(inner)[1]:.1f}"
+        )
+        late = sorted(result["seconds"])[int(0.99 * len(result["seconds"]))]
+        times = [f"{1000 * seconds:.2f}" for seconds in (middle, late, worst)]
+        rows.append((way, str(result["sent"]), str(result["sent"] - len(result["z"])), *times, quotients))
+        tell("  ".join(rows[-1]))
+    return rows
+
+
+def _spread(result: dict[str, Any]) -> tuple[float, float]:
+    """The median of the times, and the difference between it and the longest one, in seconds."""
+    middle = statistics.median(result["seconds"])
+    return middle, max(result["seconds"]) - middle
+
+
+def _commands(ros: Ros, folder: Path, spec: Path) -> dict[str, Any]:
+    """The commands that answer squares."""
+    command = ["live", str(spec), "--tool", "verilator", "--build-root", str(folder / "simulators")]
+    with LiveNode(ros, folder / "node.log", command) as node:
+        node.wait_until_ready()
+        (found,) = paced(ros, _TOPICS_RATE, _TOPICS_SECONDS, [("/image", "/command")], "squares")
+        assert node.stop() == 0, node.said()
+    return found
 
 
 def _rows(
