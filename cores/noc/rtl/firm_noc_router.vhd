@@ -137,6 +137,7 @@ begin
   begin
     unused : if WAYS = 0 generate
       s_ready(input) <= '0';
+      words(input)   <= (others => '0');
     end generate unused;
 
     used : if WAYS > 0 generate

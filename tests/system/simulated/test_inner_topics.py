@@ -526,8 +526,9 @@ def whole_payloads(
 @pytest.mark.skipif(
     not all(map(shutil.which, ("iverilog", "verilator"))), reason="Icarus Verilog or Verilator is not installed"
 )
-def test_the_netlist_in_both_simulators(tmp_path: Path) -> None:
-    UNEQUAL.build(tmp_path, 8)
+@pytest.mark.parametrize(("fabric", "width"), [("wires", 8), ("crossbar", 32), ("mesh", 8)])
+def test_the_netlist_in_both_simulators(tmp_path: Path, fabric: str, width: int) -> None:
+    UNEQUAL.build(tmp_path, width, fabric=fabric)
     request = call(tmp_path / "inner.yaml", tmp_path / "stimuli.yaml", tmp_path / "model.py")
     folder = tmp_path / "netlist"
     top, files = translated(request, folder)
