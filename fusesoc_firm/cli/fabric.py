@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,33 @@ def add_fabric(commands: Any) -> None:
         "--map", type=Path, metavar="F.svg", help="write the map of the exchange; .png, .pdf and .dot are legal, too"
     )
     add_json(show)
+    bench = command(
+        actions,
+        "bench",
+        "measure each exchange with the messages of all topics, by a model of every cycle",
+        "firm fabric bench robot.yaml",
+        _bench,
+    )
+    add_spec(bench)
+    add_sources(bench)
+    add_json(bench)
+
+
+def _bench(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.exploration.fabrics import fabrics, traffic
+    from fusesoc_firm.exploration.fabrics_text import traffic_text
+
+    loaded = load(arguments)
+    found = fabrics(loaded)
+    if arguments.json:
+        print_json([{"fabric": item.name, **asdict(traffic(item))} for item in found if item.network])
+        return
+    if len(found) == 1:
+        print("no topic is within the FPGA")
+        return
+    print("rate: messages in 1,000 cycles from the slowest publisher, if all publishers always have one")
+    print("mean, worst: cycles of a message at half of this rate, at random times")
+    print("\n".join(traffic_text(found, str(loaded.specification.project.fabric))))
 
 
 def _show(arguments: argparse.Namespace) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from random import Random
+from typing import Any, NamedTuple
 
 from fusesoc_firm.noc.estimate import delay, merge_lut, routers_lut, sender_lut
+from fusesoc_firm.noc.model import Frame, arrivals
 from fusesoc_firm.noc.network import Network, topologies
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.exchange import field_bits
@@ -15,6 +17,9 @@ from fusesoc_firm.system.system_core import LoadedSystem, with_keys
 from fusesoc_firm.system.written.specification import TOPOLOGIES, WIRES
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
+# The cycles that the model runs, those of them before messages count, and the seed of random times.
+_CYCLES, _WARM, _SEED = 4000, 1000, 1
+
 
 @dataclass(frozen=True)
 class Fabric:
@@ -22,7 +27,7 @@ class Fabric:
 
     `lut` and `ff` are estimated for an ECP5. `cycles` are those from the message with the most bits at a publisher to
     the same message at a reader, if nothing else is under way, and `interval` those between two such messages. A way
-    that is not possible has a `fault`.
+    that is not possible has a `fault`. `beats` has those of a frame of each flow.
     """
 
     name: str
@@ -32,6 +37,7 @@ class Fabric:
     cycles: int = 0
     interval: int = 1
     fault: str = ""
+    beats: tuple[int, ...] = ()
 
     @property
     def network(self) -> Network | None:
@@ -85,30 +91,89 @@ def _exchanged(name: str, system: DerivedSystem, exchange: Exchange) -> Fabric:
     sent = [topics[end.source.block] for end in exchange.ends if end.source]
     taken = [topics[end.sink.block] for end in exchange.ends if end.sink]
     lut = sum(sender_lut(_bits(item)) for item in sent) + routers_lut(network, width)
-    times = [*_times(exchange, topics, width)]
+    beats = tuple(_beats(exchange, topics, width))
+    times = [
+        (1 + delay(network, flow, sink) + count, count * len(network.flows_of(flow.source)))
+        for flow, count in zip(network.flows, beats, strict=True)
+        for sink in flow.sinks
+    ]
     return Fabric(
         name,
         exchange,
         lut=lut,
         ff=sum(map(_bits, (*sent, *taken))),
+        # A message is one cycle in the register of its publisher.
         cycles=max(cycles for cycles, _ in times),
         interval=max(interval for _, interval in times),
+        beats=beats,
     )
 
 
-def _times(exchange: Exchange, topics: dict[str, Junction], width: int) -> Iterator[tuple[int, int]]:
-    """Yield the cycles of a message of each flow, and those between two messages of its publisher.
-
-    A message is one cycle in the register of its publisher.
-    """
-    network = exchange.network
-    for flow in network.flows:
+def _beats(exchange: Exchange, topics: dict[str, Junction], width: int) -> Iterator[int]:
+    """Yield the beats of a frame of each flow."""
+    for flow in exchange.network.flows:
         source = exchange.ends[flow.source].source
         assert source is not None
-        beats = -(-_bits(topics[source.block]) // width)
-        for sink in flow.sinks:
-            yield 1 + delay(network, flow, sink) + beats, beats * len(network.flows_of(flow.source))
+        yield -(-_bits(topics[source.block]) // width)
 
 
 def _bits(junction: Junction) -> int:
     return max(1, field_bits(junction.frame))
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """What an exchange does with much traffic, by its cycle model.
+
+    `rate` is the number of messages in 1,000 cycles from the slowest publisher to its readers, if all publishers always
+    have one. `mean` and `worst` are the cycles of a message if each publisher sends half as many, at random times.
+    """
+
+    rate: float
+    mean: float
+    worst: int
+
+
+def traffic(fabric: Fabric) -> Traffic:
+    """Return the traffic of an exchange for all topics together."""
+    network = fabric.network
+    assert network is not None
+    sources = sorted({flow.source for flow in network.flows})
+    always = [_Sent(0, source) for source in sources for _ in range(_CYCLES // min(fabric.beats) + 1)]
+    ends = _received(network, fabric.beats, always)
+    counts = dict.fromkeys(sources, 0)
+    for number, end in ends.items():
+        counts[always[number].source] += end >= _WARM
+    rate = min(counts.values()) / (_CYCLES - _WARM)
+    random = Random(_SEED)
+    some = [_Sent(cycle, source) for cycle in range(_CYCLES) for source in sources if random.random() < rate / 2]
+    ends = _received(network, fabric.beats, some)
+    # The first cycle of a message is that in the register of its publisher, the last one that at its reader.
+    waits = [end + 2 - some[number].cycle for number, end in ends.items()]
+    return Traffic(1000 * rate, sum(waits) / len(waits) if waits else 0.0, max(waits, default=0))
+
+
+class _Sent(NamedTuple):
+    """A message of a source that is due in a cycle."""
+
+    cycle: int
+    source: int
+
+
+def _received(network: Network, beats: Sequence[int], sent: Sequence[_Sent]) -> dict[int, int]:
+    """Return the cycle of the last beat at the last reader of each message that all of its readers receive.
+
+    Without routers that copy, a message is a frame to each of its readers.
+    """
+    frames: list[tuple[Frame, int]] = []
+    sinks = dict.fromkeys({flow.source for flow in network.flows}, 0)
+    for place, flow in enumerate(network.flows):
+        sinks[flow.source] += len(flow.sinks)
+        frames += [
+            (Frame(item.cycle, place, beats[place]), n) for n, item in enumerate(sent) if item.source == flow.source
+        ]
+    frames.sort(key=lambda pair: (pair[0].cycle, pair[1]))
+    found: dict[int, list[int]] = {}
+    for arrival in arrivals(network, [frame for frame, _ in frames], _CYCLES):
+        found.setdefault(frames[arrival.frame][1], []).append(arrival.cycle)
+    return {number: max(ends) for number, ends in found.items() if len(ends) == sinks[sent[number].source]}

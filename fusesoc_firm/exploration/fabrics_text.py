@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from fusesoc_firm.exploration.fabrics import Fabric
+from fusesoc_firm.exploration.fabrics import Fabric, traffic
 from fusesoc_firm.exploration.tables import WIDTH, aligned, cut
 from fusesoc_firm.noc.network import Network
 from fusesoc_firm.system.derived.model import Exchange
@@ -35,6 +35,17 @@ def _row(fabric: Fabric) -> tuple[str, ...]:
         str(fabric.cycles),
         str(fabric.interval),
     )
+
+
+def traffic_text(found: Sequence[Fabric], chosen: str) -> Iterator[str]:
+    """Yield the lines of a table of the exchanges with much traffic."""
+    rows = [("", "way", "rate", "mean", "worst")]
+    for item in found:
+        if item.network:
+            result = traffic(item)
+            mark = "*" if item.name == chosen else ""
+            rows.append((mark, item.name, f"{result.rate:.1f}", f"{result.mean:.1f}", str(result.worst)))
+    yield from aligned(rows, 2)
 
 
 def map_text(exchange: Exchange) -> Iterator[str]:

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.exploration.fabrics import Fabric, fabrics
+from fusesoc_firm.exploration.fabrics import Fabric, fabrics, traffic
 from fusesoc_firm.exploration.fabrics_text import map_text
 from fusesoc_firm.noc.estimate import delay
 from fusesoc_firm.noc.model import Frame, arrivals
@@ -99,6 +99,17 @@ def test_a_lone_frame_takes_the_cycles_of_the_model(tmp_path: Path, fabric: str)
             assert routers + 8 <= cycle <= delay(network, flow, sink) + 8
 
 
+def test_traffic_is_limited_by_the_busiest_link(tmp_path: Path) -> None:
+    """Two publishers share the way to the tracker; in a mesh, the edges are sent twice."""
+    ways = found(spec(tmp_path, "auto"))
+    beats = BITS // 8
+    crossbar, mesh = traffic(ways["crossbar"]), traffic(ways["mesh"])
+    assert crossbar.rate == pytest.approx(1000 / (2 * beats), rel=0.05)
+    assert mesh.rate <= crossbar.rate
+    for result in (crossbar, mesh):
+        assert beats < result.mean < result.worst < 20 * beats
+
+
 def test_the_map_of_a_grid_and_of_others(tmp_path: Path) -> None:
     mesh = found(spec(tmp_path, "mesh"))["mesh"].exchange
     crossbar = found(spec(tmp_path, "mesh"))["crossbar"].exchange
@@ -147,6 +158,16 @@ def test_the_map_is_a_picture(tmp_path: Path, capsys: Captured) -> None:
     assert "a mesh of 3 x 2" in text
     assert text.count("rank=same") == 2
     assert "tracker" in text
+
+
+def test_bench(tmp_path: Path, capsys: Captured) -> None:
+    path = spec(tmp_path, "mesh")
+    lines = out(capsys, "fabric", "bench", path).splitlines()
+    assert [line.lstrip("* ").split()[0] for line in lines[2:]] == ["way", "crossbar", "mesh", "chain", "ring"]
+    assert lines[4].startswith("*  mesh")
+    data = json.loads(out(capsys, "fabric", "bench", path, "--json"))
+    assert [item["fabric"] for item in data] == ["crossbar", "mesh", "chain", "ring"]
+    assert out(capsys, "fabric", "bench", spec(tmp_path, "auto", has_topics=False)) == "no topic is within the FPGA\n"
 
 
 def test_wires_have_no_map(tmp_path: Path, capsys: Captured) -> None:
