@@ -95,7 +95,7 @@ def _report(arguments: argparse.Namespace) -> None:
 def _explore(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.exploration.explored_text import errors_text, picture, table
     from fusesoc_firm.exploration.placement import check_programs
-    from fusesoc_firm.exploration.points import explored
+    from fusesoc_firm.exploration.points import explored, possible_numbers
 
     numbers = _numbers(arguments.numbers)
     if arguments.topic and not arguments.bag:
@@ -106,6 +106,7 @@ def _explore(arguments: argparse.Namespace) -> None:
         check_programs()
     with Progress("compiling", is_shown=not arguments.json) as progress:
         chosen = _chosen(arguments)
+        numbers, refused = possible_numbers(chosen.type, chosen.loaded.folder, numbers)
         points = explored(chosen.type, chosen.loaded.folder, numbers, progress.step)
         errors, source = _errors(arguments, chosen, numbers)
         measured = _measured(chosen.type, points, progress) if arguments.place else {}
@@ -113,10 +114,13 @@ def _explore(arguments: argparse.Namespace) -> None:
     if arguments.svg:
         write(arguments.svg, picture(name, points))
     if arguments.json:
-        print_json(_explored_data(name, points, errors, measured))
+        faults = {item: str(fault) for item, fault in refused.items()}
+        print_json(_explored_data(name, points, errors, measured) | ({"notPossible": faults} if faults else {}))
         return
     print(f"{name}: {chosen.type.accelerator.sources[0]}, estimated for an ECP5-8; *: front, =: the specification")
     print("\n".join(table(points, measured, is_whole=arguments.all)))
+    for item, fault in refused.items():
+        print(f"{item} is not possible:\n{fault}")
     print("\n".join(errors_text(errors, source)) or f"no error: {source}")
 
 

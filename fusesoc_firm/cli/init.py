@@ -57,8 +57,8 @@ def add_init(commands: Any) -> None:
         "--include",
         action="append",
         metavar="FIELD",
-        help="a field that the accelerator receives, such as pose.position.z; may be repeated. Without --out, the "
-        "accelerator sends it, too, and all other fields of the message pass",
+        help="a field that the accelerator receives, such as pose.position.z; several by commas or by repetition. "
+        "Without --out, the accelerator sends it, too, and all other fields of the message pass",
     )
     init.add_argument("--ros", choices=("1", "2"), help="the ROS version (default: 2)")
     init.add_argument(
@@ -151,7 +151,10 @@ def _start(arguments: argparse.Namespace) -> None:
     recording = _recording(arguments)
     places = [recording.path] if recording and recording.has_definitions else []
     known = libraries([*arguments.path, *places], os.environ, arguments.distro)
-    project = replace(_project(arguments, known, recording), include=tuple(arguments.include or ()))
+    project = replace(
+        _project(arguments, known, recording),
+        include=tuple(path for item in arguments.include or () for path in item.split(",")),
+    )
     project = replace(project, has_bench=bool(arguments.bench))
     if recording:
         project = replace(project, stimuli=recording.stimuli(project, known[recording.ros], arguments.limit))

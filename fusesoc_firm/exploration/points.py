@@ -15,7 +15,7 @@ from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.hardware.compiled import program_of, schedule_of
 from fusesoc_firm.system.hardware.estimate import Estimate, estimate
 from fusesoc_firm.system.hardware.limits import counts_to_try, used
-from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import Diagnostic, InputError
 
 FIELDS, ANY = "fields", "any"
 """The numbers of a function whose fields have several types, and those of one to which they do not matter."""
@@ -66,6 +66,26 @@ class Point:
             "front": self.is_front,
             "current": self.is_current,
         }
+
+
+def possible_numbers(
+    type_: AcceleratorType, folder: Path, numbers: Sequence[str]
+) -> tuple[list[str], dict[str, Diagnostic]]:
+    """Return the numbers with which a function compiles, and for each other one the first fault.
+
+    A function may name a type, as a state with `numpy.float32` does. Raise `InputError` if it compiles with none.
+    """
+    possible, refused = list[str](), dict[str, InputError]()
+    for name in numbers:
+        try:
+            program_of(type_, folder, name)
+        except InputError as error:
+            refused[name] = error
+        else:
+            possible.append(name)
+    if not possible:
+        raise refused[numbers[-1]]
+    return possible, {name: error.diagnostics[0] for name, error in refused.items()}
 
 
 def explored(type_: AcceleratorType, folder: Path, numbers: Sequence[str], tell: Tell) -> list[Point]:

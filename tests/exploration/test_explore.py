@@ -41,6 +41,23 @@ pid = Sum()
 """
 
 
+FLOAT32 = """
+import numpy as np
+
+
+class Sum:
+    def __init__(self):
+        self.total = np.float32(0.0)
+
+    def __call__(self, message):
+        self.total += message.range
+        return {"data": self.total}
+
+
+filter_range = Sum()
+"""
+
+
 def points(spec: Path, *numbers: str) -> list[Point]:
     system, type_ = loaded(spec)
     return explored(type_, system.folder, numbers, lambda _: None)
@@ -93,6 +110,18 @@ def test_a_function_without_floats_has_any_numbers(tmp_path: Path) -> None:
     )
     (found,) = points(spec, "float32", "float64")
     assert (found.numbers, found.is_front, found.is_current) == ("any", True, True)
+
+
+def test_a_type_that_a_function_excludes_is_told(tmp_path: Path, capsys: Captured) -> None:
+    """A state with a type of its own cannot be a float64."""
+    spec = project(tmp_path, "filter_range", FLOAT32)
+    text = out(capsys, str(spec))
+    assert "\nfloat64 is not possible:\n" in text
+    assert "'filter_range.total' is a float32 and a float64" in text
+    data = json.loads(out(capsys, str(spec), "--json"))
+    assert {item["numbers"] for item in data["points"]} == {"float32"}
+    assert [*data["notPossible"]] == ["float64"]
+    assert main(["accelerator", "explore", str(spec), "--numbers", "float64"]) == 1
 
 
 def test_fields_of_several_types_are_a_point_of_their_own(tmp_path: Path) -> None:
