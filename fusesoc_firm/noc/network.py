@@ -204,7 +204,7 @@ class Channel:
             return f"input of endpoint {self.source.number}"
         if self.sink.is_endpoint:
             return f"output to endpoint {self.sink.number}"
-        return f"link from router {self.source.number} to {self.sink.number}"
+        return f"link from router {self.source.number} to router {self.sink.number}"
 
 
 @dataclass(frozen=True)
