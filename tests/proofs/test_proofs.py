@@ -15,11 +15,15 @@ from tools.proofs.smtbmc import Task
 
 needs_solver = pytest.mark.skipif(not smtbmc.is_installed(), reason="no yosys or z3-solver; make check installs them")
 
-_SIZES = [pytest.param(proof, size, id=f"{proof.name}-{size}") for proof in PROOFS for size in proof.sizes]
+_SIZES = [
+    pytest.param(proof, size, id=f"{proof.name}-{size}", marks=[mark])
+    for proof in PROOFS
+    for mark, sizes in ((pytest.mark.check, proof.sizes), (pytest.mark.thorough, proof.long_sizes))
+    for size in sizes
+]
 _FAULTS = [(proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates]
 
 
-@pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "size"), _SIZES)
 def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def _seconds(proof: Proof) -> float | None:
     """The seconds of a processor for all sizes, without the faults; None if something is not as it should be."""
     start = sum(os.times()[:4])
     is_good = True
-    for size in proof.sizes:
+    for size in (*proof.sizes, *proof.long_sizes):
         with tempfile.TemporaryDirectory() as name:
             outcome = proof.prove(size, Path(name))
         is_good = _tell(f"{proof.name}, {size}", "proved" if outcome.is_proved else "NOT PROVED") and is_good

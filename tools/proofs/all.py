@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from tools.proofs import manager, memories, parts, schedulers
+from tools.proofs import manager, memories, noc, parts, schedulers
 
-PROOFS = (*manager.PROOFS, *parts.PROOFS, *memories.PROOFS, *schedulers.PROOFS)
+PROOFS = (*manager.PROOFS, *parts.PROOFS, *noc.PROOFS, *memories.PROOFS, *schedulers.PROOFS)

@@ -28,7 +28,10 @@ _SHORT = {
     "INDEX_BITS": "I",
     "LONGEST": "B",
     "SAMPLES": "S",
+    "PORTS": "P",
 }
+# Generics whose bits are counted.
+_COUNTED = {"TURNS": "T", "COPIES": "C"}
 # Generics that a table says if they are true.
 _CHOICES = {"DROP_OLDEST": "drop_oldest", "DROP_NEWEST": "drop_newest", "SHARED_READ": "shared_read"}
 
@@ -66,7 +69,7 @@ def write(seconds: Mapping[str, float]) -> None:
 
 
 def _sizes(proof: Proof) -> str:
-    return "; ".join(" ".join(_words(size)) for size in proof.sizes)
+    return "; ".join(" ".join(_words(size)) for size in (*proof.sizes, *proof.long_sizes))
 
 
 def _words(size: Size) -> Iterator[str]:
@@ -75,6 +78,8 @@ def _words(size: Size) -> Iterator[str]:
     for name, value in size.items():
         if name in short:
             yield f"{short[name]}={value}"
+        elif name in _COUNTED and value:
+            yield f"{_COUNTED[name]}={int(value).bit_count()}"
         elif value and name in _CHOICES:
             yield _CHOICES[name]
 

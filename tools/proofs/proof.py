@@ -47,11 +47,11 @@ class Mutation:
 class Proof:
     """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics.
 
-    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace`
-    is the length of those that are searched for what a mutation violates. The harness gets the generics and `defines`
-    as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are VHDL files beside the harness, such
-    as a wrapper; `helpers` is the entity's own part of a harness that is for several. With a `converter`, the entity is
-    a generated one.
+    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset or, with
+    `finds_invariant`, by an inductive invariant that is searched for. `trace` is the length of the traces that are
+    searched for what a mutation violates. The harness gets the generics and `defines` as macros, and `PUBLISHERS_4`,
+    for `ifdef`, where PUBLISHERS is 4. `sources` are VHDL files beside the harness, such as a wrapper; `helpers` is the
+    entity's own part of a harness that is for several. With a `converter`, the entity is a generated one.
     """
 
     harness: str
@@ -66,6 +66,9 @@ class Proof:
     variant: str = ""
     trace: int = 12
     is_bounded: bool = False
+    finds_invariant: bool = False
+    # Further sizes, which take minutes, so that tests prove them only if they are thorough.
+    long_sizes: tuple[Size, ...] = ()
     converter: Converter | None = None
 
     @property
@@ -75,7 +78,9 @@ class Proof:
 
     @property
     def method(self) -> str:
-        """`induction over 4 cycles`, or `all traces of 16 cycles`."""
+        """`induction over 4 cycles`, `all traces of 16 cycles`, or `inductive invariant (PDR)`."""
+        if self.finds_invariant:
+            return "inductive invariant (PDR)"
         return f"all traces of {self.depth} cycles" if self.is_bounded else f"induction over {self.depth} cycles"
 
     @property
@@ -87,6 +92,8 @@ class Proof:
     def prove(self, size: Size, folder: Path) -> Outcome:
         """Prove all assertions at a size; `folder` is empty."""
         task = self._task(self._sources(folder), size, folder)
+        if self.finds_invariant:
+            return task.prove_by_invariant(folder, self.depth)
         return task.check(folder, self.depth) if self.is_bounded else task.prove(folder, self.depth)
 
     def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:

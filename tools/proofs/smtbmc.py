@@ -67,6 +67,7 @@ _WRITE_GATES = (
     f"write_aiger -I -zinit {_GATES}",
 )
 _STATUS = re.compile(r"Status: (PASSED|FAILED|UNKNOWN)")
+_INVARIANT = "Property proved."
 _VIOLATED = re.compile(r"Output \d+ of miter \S+ was asserted in frame (\d+)|No output asserted")
 _FAILED = re.compile(r"Assert failed in \S+: (\w+)")
 
@@ -109,12 +110,23 @@ class Task:
         log = _ran(folder, ["yosys-smtbmc", "-s", "z3", "-i", "-t", str(depth), _MODEL])
         return Outcome(_status(log) == "PASSED", (), base.log + log)
 
+    def prove_by_invariant(self, folder: Path, depth: int) -> Outcome:
+        """Prove all assertions by an inductive invariant, which ABC finds (PDR) and checks; `folder` is empty.
+
+        The traces of the first `depth` cycles from reset are checked before, so that a violated assertion is named.
+        """
+        base = self.check(folder, depth)
+        if not base.is_proved:
+            return base
+        log = self._traces(folder, ("check -assert",), "orpos; scorr; pdr")
+        return Outcome(_INVARIANT in log, (), base.log + log)
+
     def check(self, folder: Path, depth: int) -> Outcome:
         """Check all assertions in all traces of `depth` cycles from reset, after which one must go on.
 
         `folder` is empty.
         """
-        log = self._traces(folder, ("check -assert",), depth + 1, _END.format(end=depth))
+        log = self._traces(folder, ("check -assert",), f"bmc3 -F {depth + 1}", _END.format(end=depth))
         if _violated(log) == depth:
             return Outcome(True, (), log)
         log = _ran(folder, ["yosys-smtbmc", "-s", "z3", "-t", str(depth), _MODEL])
@@ -124,20 +136,20 @@ class Task:
         """Look for a trace of `depth` cycles from reset that violates one assertion; `folder` is empty."""
         assertion = f"{self._top}/{label}"
         only = (f"select -assert-count 1 {assertion}", f"chformal -assert -remove {self._top}/* {assertion} %d")
-        log = self._traces(folder, only, depth)
+        log = self._traces(folder, only, f"bmc3 -F {depth}")
         return Outcome(False, (label,), log) if _violated(log) is not None else Outcome(True, (), log)
 
     @property
     def _top(self) -> str:
         return Path(self.harness).stem
 
-    def _traces(self, folder: Path, commands: Sequence[str], depth: int, more: str = "") -> str:
-        """What ABC says of traces of `depth` cycles and the assertions that `commands` leave, and those in `more`."""
+    def _traces(self, folder: Path, commands: Sequence[str], engine: str, more: str = "") -> str:
+        """What an engine of ABC says of all traces and the assertions that `commands` leave, and those in `more`."""
         for name, text in self.files.items():
             head, end, _ = text.rpartition("endmodule")
             (folder / name).write_text(f"{head}{more}{end}\n" if name == self.harness else text, encoding="utf-8")
         _ran(folder, ["yosys", "-q", "-p", "; ".join(self._commands(commands, _WRITE_MODEL if more else ()))])
-        return _ran(folder, ["yosys-abc", "-s", "-c", f"read_aiger {_GATES}; fold; strash; bmc3 -F {depth}"])
+        return _ran(folder, ["yosys-abc", "-s", "-c", f"read_aiger {_GATES}; fold; strash; {engine}"])
 
     def _commands(self, commands: Sequence[str], model: Sequence[str]) -> Iterator[str]:
         defines = " ".join(f"-D{name}={value}" for name, value in self.defines.items())
