@@ -31,6 +31,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.noc.hardware import TEMPLATE, exchange_configuration
+from fusesoc_firm.noc.network import Flow, Network, mesh
 from fusesoc_firm.runs.verify.loop import loop_text
 from fusesoc_firm.system.hardware.registers import registers_configuration
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, status_map
@@ -149,6 +151,13 @@ def write_registers() -> None:
         (SAMPLES / f"{name}.vhd").write_text(render(REGISTERS_TEMPLATE, configuration), encoding="ascii")
 
 
+def write_exchange() -> None:
+    """Write an exchange in which some endpoints send or receive nothing."""
+    topology = mesh(3, 2)
+    network = Network(topology, topology.slots, (Flow(0, (2,)), Flow(0, (4,)), Flow(3, (0,))))
+    (SAMPLES / "exchange.vhd").write_text(render(TEMPLATE, exchange_configuration("exchange", network, 8)))
+
+
 # A node of ROS 1 in the sockets of a chip.
 CHIP = """\
 project:
@@ -189,6 +198,7 @@ def samples() -> list[Path]:
     write_converters()
     write_loop()
     write_registers()
+    write_exchange()
     write_chip()
     made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
     return sorted([*made, *GOLDEN.glob("*.vhd")])

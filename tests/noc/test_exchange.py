@@ -179,3 +179,16 @@ def test_an_illegal_generic_is_named(entity: str, generic: str, value: int, lega
     result = library.run(entity, {generic: value})
     assert result.exit_code != 0
     assert f"{entity}: {generic} is {value}; legal: {legal}" in result.output
+
+
+@pytest.mark.parametrize("depth", [2, 4])
+@pytest.mark.parametrize("stall_percent", [0, 40])
+def test_a_router_alone(depth: int, stall_percent: int, tmp_path: Path) -> None:
+    print(f"seed {SEED}")
+    library = Library("firm", tmp_path)
+    library.analyse(core_files("axis/package", "noc/noc", "sim/checker", "sim/host"))
+    library.analyse(core_files("noc/noc", fileset="tb"))
+    generics: dict[str, Generic] = {"SEED": SEED, "DEPTH": depth, "STALL_PERCENT": stall_percent, "FRAMES": 300}
+    result = library.run("firm_noc_router_tb", generics, options=["--ieee-asserts=disable-at-0"])
+    assert result.exit_code == 0, result.output
+    assert "PASS" in result.output

@@ -56,6 +56,7 @@ def test_kinds_and_sizes() -> None:
     assert torus(3, 3).way(4, 0) == (4, 5, 3, 6, 0)
     assert ring(4).way(3, 1) == (3, 0, 1)
     assert tree(16).way(0, 3) == (0, 4, 3)
+    assert tree(30).way(0, 7) == (0, 8, 10, 9, 7)
     assert chain(4).way(3, 1) == (3, 2, 1)
 
 
@@ -121,15 +122,17 @@ def test_a_cycle_is_named() -> None:
     }
 
 
-def test_copies_hold_the_outputs_of_each_other() -> None:
-    """Endpoint 2 holds the copy of a frame until 1 takes another one, which waits for the rest of the other copy."""
-    flows = (Flow(0, (1, 2)), Flow(2, (1,)))
-    assert network(crossbar(3), flows).cycle() is None
-    assert network(crossbar(3), flows).cycle(held=[2]) is not None
-    assert _deadlocks(network(crossbar(3), flows), frozenset({2}), SEED)
-    alone = (Flow(0, (1,)), Flow(0, (2,)), Flow(2, (1,)))
-    assert network(crossbar(3), alone).cycle(held=[2]) is None
-    assert not _deadlocks(network(crossbar(3), alone), frozenset({2}), SEED)
+@pytest.mark.parametrize(("holder", "other"), [(1, 2), (2, 1)])
+def test_copies_hold_the_outputs_of_each_other(holder: int, other: int) -> None:
+    """An endpoint holds the copy of a frame until the other one takes its own frame, which waits for the other copy."""
+    copies = network(crossbar(3), (Flow(0, (1, 2)), Flow(holder, (other,))))
+    assert copies.cycle() is None
+    assert copies.cycle(held=[holder]) is not None
+    assert copies.cycle(held=[other]) is None
+    assert _deadlocks(copies, frozenset({holder}), SEED)
+    alone = network(crossbar(3), (Flow(0, (1,)), Flow(0, (2,)), Flow(holder, (other,))))
+    assert alone.cycle(held=[holder]) is None
+    assert not _deadlocks(alone, frozenset({holder}), SEED)
 
 
 # --- random networks -------------------------------------------------------------------------------------------------
