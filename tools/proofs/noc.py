@@ -66,7 +66,7 @@ PROOFS = (
             ),
             Mutation(_ROUTER, _RENEW, "when offered = '1' else '1'", ("frames_never_mix",)),
             Mutation(_ROUTER, _RENEW, "when offered = '1' else '0'", ("idle_for_one_cycle",)),
-            Mutation(_ROUTER, "valid and not first(1)", "valid", ("turn_is_legal",), _CORNER),
+            Mutation(_ROUTER, "valid and not first(1+DEST_BITS)", "valid", ("turn_is_legal",), _CORNER),
             Mutation(_ROUTER, _NEXT, "for turn in 0 downto 1 loop", ("after_at_most_all_others",), _CORNER),
             Mutation(_ROUTER, "left <= wanted and not done_r;", "left <= wanted;", ("in_order_unchanged",)),
             Mutation(_ROUTER, "else begins_r;", "else '0';", ("copies_ascend",)),

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A wormhole router of frames. ROUTES are constants, so a router consists only of the turns that its frames use. The
 -- outputs of a beat are looked up before the input buffer and kept in it with one bit for each output, so that requests
--- are registers. An output keeps its input from a frame's first beat to its last one; then the next input that
+-- are registers; so is the destination, which the next router looks up. An output keeps its input from a frame's first beat to its last one; then the next input that
 -- requests it has its turn, round robin. The grant is a register, which stays with the last input while none requests:
 -- beats of one input pass without a gap, one cycle after they have arrived, and the change of an idle output to another
 -- input costs one cycle.
@@ -50,7 +50,7 @@ architecture rtl of firm_noc_router is
   constant WORD_BITS : positive := 1 + BITS + DEST_BITS;
   constant NONE      : std_logic_vector(PORTS-1 downto 0) := (others => '0');
 
-  -- A beat with its mark, in the lowest bit, and its destination.
+  -- A beat with its destination and, in the lowest bit, its mark of the last one.
   subtype word_t is std_logic_vector(WORD_BITS-1 downto 0);
   type words_t is array (natural range <>) of word_t;
 
@@ -144,34 +144,32 @@ begin
       constant COPIES : boolean := has_copies(ROUTES, input);
       constant KEPT   : natural := kept_ways(WAYS, COPIES);
 
-      signal payload  : std_logic_vector(WORD_BITS-2 downto 0);
-      signal arriving : std_logic_vector(KEPT downto 0);  -- ways and, in the lowest bit, the mark of the last beat
-      signal first    : std_logic_vector(KEPT downto 0);
+      -- The ways, the destination, which the next router looks up, and the mark of the last beat.
+      signal arriving : std_logic_vector(KEPT+DEST_BITS downto 0);
+      signal first    : std_logic_vector(KEPT+DEST_BITS downto 0);
       signal valid    : std_logic;
       signal pop      : std_logic;
       signal wanted   : std_logic_vector(WAYS-1 downto 0);  -- the ways of the first beat
       signal taken    : std_logic_vector(WAYS-1 downto 0);
     begin
-      payload <= s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS)
-                 & s_beat((input+1)*BITS-1 downto input*BITS);
-
-      arriving(0)     <= s_last(input);
-      words(input)(0) <= first(0);
+      arriving(0)                      <= s_last(input);
+      arriving(DEST_BITS downto 1)     <= s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS);
+      words(input)(DEST_BITS downto 0) <= first(DEST_BITS downto 0);
 
       u_buffer : entity firm.firm_noc_buffer
         generic map (
-          BITS         => BITS+DEST_BITS,
-          CONTROL_BITS => 1+KEPT,
+          BITS         => BITS,
+          CONTROL_BITS => 1+DEST_BITS+KEPT,
           DEPTH        => DEPTH
         )
         port map (
           clk       => clk,
           rst_n     => rst_n,
-          s_payload => payload,
+          s_payload => s_beat((input+1)*BITS-1 downto input*BITS),
           s_control => arriving,
           s_valid   => s_valid(input),
           s_ready   => s_ready(input),
-          m_payload => words(input)(WORD_BITS-1 downto 1),
+          m_payload => words(input)(WORD_BITS-1 downto DEST_BITS+1),
           m_control => first,
           m_valid   => valid,
           m_ready   => pop
@@ -182,18 +180,19 @@ begin
       end generate single_way;
 
       either_way : if KEPT = 1 and WAYS = 2 generate
-        arriving(1) <= leads(s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS),
+        arriving(1+DEST_BITS) <= leads(s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS),
                              input, output_from(TURNS, PORTS, input, 1));
-        wanted(0)   <= valid and not first(1);
-        wanted(1)   <= valid and first(1);
+        wanted(0)   <= valid and not first(1+DEST_BITS);
+        wanted(1)   <= valid and first(1+DEST_BITS);
       end generate either_way;
 
       each_way : for way in 0 to WAYS-1 generate
         constant OUTPUT : natural := output_from(TURNS, PORTS, input, way);
       begin
         kept_way : if KEPT = WAYS generate
-          arriving(1+way) <= leads(s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS), input, OUTPUT);
-          wanted(way)     <= valid and first(1+way);
+          arriving(1+DEST_BITS+way)
+            <= leads(s_destination((input+1)*DEST_BITS-1 downto input*DEST_BITS), input, OUTPUT);
+          wanted(way) <= valid and first(1+DEST_BITS+way);
         end generate kept_way;
 
         taken(way) <= takes(input*PORTS + OUTPUT);
@@ -246,9 +245,9 @@ begin
 
     signal word : word_t;
   begin
-    m_last(output)                                              <= word(0);
-    m_beat((output+1)*BITS-1 downto output*BITS)                <= word(BITS downto 1);
-    m_destination((output+1)*DEST_BITS-1 downto output*DEST_BITS) <= word(WORD_BITS-1 downto BITS+1);
+    m_last(output)                                                <= word(0);
+    m_destination((output+1)*DEST_BITS-1 downto output*DEST_BITS) <= word(DEST_BITS downto 1);
+    m_beat((output+1)*BITS-1 downto output*BITS)                  <= word(WORD_BITS-1 downto DEST_BITS+1);
 
     unused : if INPUTS = 0 generate
       word            <= (others => '0');
