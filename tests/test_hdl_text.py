@@ -10,6 +10,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
 ROOMS = (
     "converter",
+    "noc",
     "system/hardware",
     "system/boards",
     "system/scaffold",

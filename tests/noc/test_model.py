@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.noc.model import Arrival, Beat, Frame, Model, arrivals
-from fusesoc_firm.noc.network import Flow, Network, crossbar, mesh
+from fusesoc_firm.noc.model import Arrival, Beat, Frame, Model, arrivals, latency, random_frames, throughput
+from fusesoc_firm.noc.network import Flow, Network, chain, crossbar, mesh
 from tests.noc.exchanges import all_to_all, analysed, network
 from tests.noc.test_exchange import NETWORKS, simulated
 from tests.seeds import seeded
+from tools.bench.noc import Relays
 
 SEED = seeded(190)
 
@@ -68,3 +69,30 @@ def test_a_deaf_sink_stops_only_frames_that_need_it() -> None:
         Frame(20, places[2, 1], 8),
     ]
     assert {arrival.frame for arrival in arrivals(made, frames, 100, deaf=[3])} == {1, 3}
+
+
+def test_throughput_is_that_of_the_narrowest_channel() -> None:
+    assert throughput(network(crossbar(4), (Flow(0, (1,)), Flow(2, (3,)))), cycles=500) == 2
+    assert throughput(network(crossbar(4), (Flow(0, (3,)), Flow(1, (3,)), Flow(2, (3,)))), cycles=500) == 1
+    # A copy counts at each endpoint that it reaches; its first beat needs a cycle for each of them.
+    assert throughput(network(crossbar(3), (Flow(0, (1, 2)),)), beats=9, cycles=1000) == pytest.approx(1.8, abs=0.01)
+
+
+def test_flows_are_chosen_by_their_rates() -> None:
+    made = network(crossbar(3), (Flow(0, (1,), 3.0), Flow(0, (2,), 1.0)))
+    frames = random_frames(made, 0.8, 4, 20_000)
+    assert len(frames) == pytest.approx(0.8 / 4 * 20_000, rel=0.05)
+    assert sum(frame.flow == 0 for frame in frames) == pytest.approx(0.75 * len(frames), rel=0.05)
+
+
+def test_latency_at_a_low_load_is_that_of_the_way() -> None:
+    """The routers, and the frame's beats: its last one is taken in the cycle in which it arrives."""
+    assert latency(network(chain(4), (Flow(0, (3,)),)), 0.001, beats=5, cycles=20_000) == 4 + 5
+    assert latency(network(crossbar(2), (Flow(0, (1,)),)), 0.001, beats=5, cycles=20_000) == 1 + 5
+
+
+def test_relays_share_the_channels_of_the_manager() -> None:
+    """The frames of accelerators pass both of its channels, those to and from the host one of them."""
+    assert Relays(network(crossbar(4), (Flow(1, (2,)), Flow(3, (1,))))).throughput() == pytest.approx(1, abs=0.01)
+    assert Relays(network(crossbar(3), (Flow(1, (0,)), Flow(0, (2,))))).throughput() == pytest.approx(2, abs=0.01)
+    assert Relays(network(crossbar(4), (Flow(1, (2,)), Flow(2, (0,))))).throughput() == pytest.approx(1, abs=0.01)

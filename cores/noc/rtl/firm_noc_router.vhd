@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A wormhole router of frames. ROUTES are constants, so a router consists only of the turns that its frames use. The
--- outputs of a beat are looked up before the input buffer and kept in it with one bit for each output, so that requests
--- are registers; so is the destination, which the next router looks up. An output keeps its input from a frame's first beat to its last one; then the next input that
--- requests it has its turn, round robin. The grant is a register, which stays with the last input while none requests:
--- beats of one input pass without a gap, one cycle after they have arrived, and the change of an idle output to another
--- input costs one cycle.
+-- outputs of a beat are looked up before the input buffer and kept in it with one bit for each output. Therefore,
+-- requests are registers, and so is the destination, which the next router looks up. An output keeps its input from a
+-- frame's first beat to its last one. Then the next input that requests it has its turn, round robin. The grant is a
+-- register, which stays with the last input while none requests. Beats of one input pass without a gap, one cycle after
+-- they have arrived; the change of an idle output to another input costs one cycle.
 -- If a destination has several outputs, these are acquired in ascending order, each with its copy of the frame's first
 -- beat, so frames never wait for each other in a circle. Each output takes each further beat on its own.
 library ieee;
@@ -17,11 +17,11 @@ use firm.firm_noc_pkg.all;
 entity firm_noc_router is
   generic (
     -- Of a beat, without the mark of the last one.
-    BITS      : integer := 10;
-    DEST_BITS : integer := 1;
-    PORTS     : integer := 2;
+    BITS      : positive := 10;
+    DEST_BITS : integer  := 1;
+    PORTS     : positive := 2;
     -- The beats in an input's buffer: 2, in registers, or a larger power of two, in memories.
-    DEPTH : integer := 2;
+    DEPTH : positive := 2;
     -- At each input, a destination without a route never arrives.
     ROUTES : routes_t := ((0, 0, 1), (1, 0, 0))
   );
@@ -115,16 +115,9 @@ architecture rtl of firm_noc_router is
 
 begin
 
-  assert BITS >= 1
-    report "firm_noc_router: BITS is " & integer'image(BITS) & "; legal: 1 or more"
-    severity failure;
   assert DEST_BITS >= 1 and DEST_BITS <= 16
     report "firm_noc_router: DEST_BITS is " & integer'image(DEST_BITS) & "; legal: 1 to 16"
     severity failure;
-  assert PORTS >= 1
-    report "firm_noc_router: PORTS is " & integer'image(PORTS) & "; legal: 1 or more"
-    severity failure;
-
   every_turn : for turn in 0 to PORTS*PORTS-1 generate
     unused : if TURNS(turn) = '0' generate
       requests(turn) <= '0';
