@@ -1,6 +1,7 @@
 """A model of an exchange, which is `firm_noc_router` beat for beat and cycle for cycle.
 
-`Model` makes one step for each cycle. `arrivals` runs it with frames that become due over time.
+`Model` makes one step for each cycle. `arrivals` runs it with frames that become due over time, `throughput` with
+sources that always have frames, and `latency` with random frames.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from random import Random
 from typing import NamedTuple
 
 from fusesoc_firm.noc.network import Flow, Network, Port
@@ -223,4 +225,62 @@ def arrivals(
         for source in taken:
             waiting[source].popleft()
         found += [Arrival(cycle, sink, beat.tag) for sink, beat in arrived.items() if beat.is_last]
+    return found
+
+
+def throughput(network: Network, *, buffers: int = 2, beats: int = 8, cycles: int = 4000, seed: int = 1) -> float:
+    """Return the beats that all endpoints receive in a cycle if each source always has a frame of so many beats.
+
+    A source chooses its flows at random by their rates. The first fifth of the cycles does not count.
+    """
+    random = Random(seed)
+    model = Model(network, buffers)
+    choices = _choices(network)
+    sending: dict[int, deque[Beat]] = {source: deque() for source in choices}
+    received = 0
+    for cycle in range(cycles):
+        for source, left in sending.items():
+            if not left:
+                (flow,) = random.choices(*choices[source])
+                left.extend(Beat(flow, place == beats - 1) for place in range(beats))
+        taken, arrived = model.step({source: left[0] for source, left in sending.items()}, lambda _: True)
+        for source in taken:
+            sending[source].popleft()
+        received += len(arrived) if cycle >= cycles // 5 else 0
+    return received / (cycles - cycles // 5)
+
+
+def latency(network: Network, load: float, *, buffers: int = 2, beats: int = 8, cycles: int = 4000) -> float:
+    """Return the mean cycles from the cycle in which a frame is due to the one in which its last beat arrives.
+
+    `load` is the number of beats that all sources together send in a cycle. Frames that are due in the last fifth of
+    the cycles do not count; those that never arrive count as if they arrived at the end.
+    """
+    frames = random_frames(network, load, beats, cycles)
+    counted = [number for number, frame in enumerate(frames) if frame.cycle < cycles - cycles // 5]
+    ends = {arrival.frame: arrival.cycle for arrival in arrivals(network, frames, cycles, buffers=buffers)}
+    waits = [ends.get(number, cycles) + 1 - frames[number].cycle for number in counted]
+    return sum(waits) / len(waits) if waits else 0.0
+
+
+def random_frames(network: Network, load: float, beats: int, cycles: int, seed: int = 1) -> list[Frame]:
+    """Return random frames of all sources, which together send `load` beats in a cycle."""
+    random = Random(seed)
+    choices = _choices(network)
+    chance = load / beats / max(1, len(choices))
+    return [
+        Frame(cycle, random.choices(flows, rates)[0], beats)
+        for cycle in range(cycles)
+        for flows, rates in choices.values()
+        if random.random() < chance
+    ]
+
+
+def _choices(network: Network) -> dict[int, tuple[list[int], list[float]]]:
+    """Return the flows of each source, and their rates."""
+    found: dict[int, tuple[list[int], list[float]]] = {}
+    for place, flow in enumerate(network.flows):
+        flows, rates = found.setdefault(flow.source, ([], []))
+        flows.append(place)
+        rates.append(flow.rate)
     return found

@@ -30,6 +30,7 @@ from tools.bench import (
     loops,
     manager,
     network,
+    noc,
     passing,
     peers,
     replay,
@@ -62,7 +63,7 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, network, kernels, fuzz, loops, builds and actions: only rows whose names match, such as"
+        help="for timing, network, noc, kernels, fuzz, loops, builds and actions: only rows whose names match, such as"
         " 'Image.* 64 bits'; for live and studio: only tables",
     )
     parser.add_argument(
@@ -71,7 +72,7 @@ def main() -> int:
         nargs="+",
         default=SEEDS,
         metavar="N",
-        help="for timing, network, kernels and peers: of placements (default: 1 2 3)",
+        help="for timing, network, noc, kernels and peers: of placements (default: 1 2 3)",
     )
     arguments = parser.parse_args()
     if unknown := set(arguments.parts) - set(figures.parts()):
@@ -105,6 +106,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "network": lambda: network.measure(
             Nextpnr(Yosys(), device=network.DEVICE), _tell, figures.written(), arguments.row, arguments.seeds
         ),
+        "noc": lambda: noc.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
         "kernels": lambda: kernels.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
         "peers": lambda: peers.measure(Nextpnr(Yosys()), _tell, arguments.seeds),
         "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),

@@ -27,6 +27,7 @@ from tools.bench import (
     manager,
     network,
     nextpnr,
+    noc,
     passing,
     peers,
     replay,
@@ -98,6 +99,12 @@ PAGES = (
         "their area, cycles, clock and compile time",
         ("kernels",),
     ),
+    Page(
+        "noc",
+        "Figures of networks on chip",
+        "area, clock, throughput and latency of exchanges within the FPGA",
+        ("noc",),
+    ),
     Page("network", "Figures of a node in fabric", "area and clock", ("network",)),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
@@ -117,6 +124,7 @@ _HEADINGS = {
     "links": "Links and crossings",
     "applications": "Applications",
     "kernels": "Kernels",
+    "noc": "Networks on chip",
     "network": "ROS 2 by Ethernet",
     "systems": "Systems",
     "builds": "Builds",
@@ -169,6 +177,9 @@ _METHODS = {
         and MHz are measured as in [Timing](timing.md#timing). `make bench BENCH='kernels --row pid'` measures only
         the rows whose names match. `HOLOSO=PYTHON` names a Python with
         the package holoso, for the second table.""",
+    "noc": """LUT4, FF and MHz are measured as in [Timing](timing.md#timing). Throughput and latency are those of a
+        cycle model, which has the handshakes of the [hardware](../../cores/noc/README.md) in every cycle.
+        `make bench BENCH='noc --row router'` measures only the rows whose names match.""",
     "network": f"""LUT4, FF and MHz are measured as in [Timing](timing.md#timing), with nextpnr's
         `{network.DEVICE}`.""",
     "systems": "The table lists the time to check and generate a large system.",
@@ -216,6 +227,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         links,
         applications,
         kernels,
+        noc,
         network,
         peers,
         systems,
@@ -281,9 +293,13 @@ def _versions(part: str) -> str:
         tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
-    elif part in ("area", "manager", "timing", "kernels", "network", "peers", "links", "applications"):
+    elif part in ("area", "manager", "timing", "kernels", "noc", "network", "peers", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
-        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part in ("timing", "kernels", "network", "peers") else []
+        tools += (
+            [f"{nextpnr.PACKAGE} {nextpnr.version()}"]
+            if part in ("timing", "kernels", "noc", "network", "peers")
+            else []
+        )
         tools += peers.versions() if part == "peers" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
