@@ -141,7 +141,10 @@ architecture rtl of firm_float_atan2 is
   -- Zeros before the first turn, and whether the vector is turned in this cycle.
   signal zeros_r       : unsigned(levels_for(DIGITS)-1 downto 0);
   signal is_turning_r  : std_logic;
-  -- Of the turn; it does not overflow.
+  -- Whether this cycle increments the index: if it turns the vector, or if the zeros are those before the first turn.
+  signal is_counting_r : std_logic;
+  -- Of the first turn, and of the turn; it does not overflow.
+  signal first_r       : unsigned(INDEX_BITS-1 downto 0);
   signal index_r       : unsigned(INDEX_BITS-1 downto 0);
   -- Places by which the differences are still to be moved to the left, and whether this cycle moves them.
   signal places_r      : unsigned(INDEX_BITS-1 downto 0);
@@ -195,15 +198,22 @@ begin
   begin
     if rising_edge(clk) then
       is_below := short_r(WIDTH-1);
-      -- A number that is not turned is doubled only.
+      -- A number that is not turned is not changed.
       mask := (others => '0');
       if is_turning_r = '1' then
         mask := long_r;
       end if;
       turned     := summed(short_r, mask, not is_below);
-      next_short := shift_left(turned, 1);
+      -- The sum is on the longest path, so that few choices follow it.
+      next_short := turned;
+      if is_turning_r = '1' or (state_r = NORMALISE and short_r(INNER) = '0') then
+        next_short := shift_left(turned, 1);
+      end if;
       next_index := index_r;
-      left       := places_r;
+      if is_counting_r = '1' and index_r /= 2**INDEX_BITS-1 then
+        next_index := index_r + 1;
+      end if;
+      left := places_r;
 
       if state_r = IDLE then
         y_r        <= in_y;
@@ -248,23 +258,17 @@ begin
         if long_r(INNER) = '0' then
           long_r <= shift_left(long_r, 1);
         end if;
-        if short_r(INNER) = '1' then
-          next_short := short_r;
-        end if;
 
       elsif state_r = PREPARE then
         -- The place of the first digit, above the smallest exponent.
         below         := to_signed(BIAS+1, RANGE_BITS) - distance_r;
         exponent_r    <= below;
         zeros_r       <= (others => '0');
-        next_short    := short_r;
-        next_index    := limited(distance_r, INDEX_BITS);
-        left          := limited(distance_r, INDEX_BITS);
+        first_r       <= limited(distance_r, INDEX_BITS);
         if is_offset = '1' then
           exponent_r <= to_signed(BIAS+1, RANGE_BITS);
           zeros_r    <= limited(distance_r, zeros_r'length);
-          next_index := (others => '0');
-          left       := (others => '0');
+          first_r    <= (others => '0');
         elsif below < 1 then
           exponent_r <= to_signed(1, RANGE_BITS);
           zeros_r    <= limited(to_signed(1, RANGE_BITS) - below, zeros_r'length);
@@ -280,22 +284,22 @@ begin
         state_r       <= BEGIN_TURNS;
 
       elsif state_r = BEGIN_TURNS then
-        next_short := short_r;
+        next_index := first_r;
+        left       := first_r;
+        is_counting_r <= is_offset;
         if zeros_r = 0 then
-          is_turning_r <= '1';
+          is_turning_r  <= '1';
+          is_counting_r <= '1';
         end if;
         state_r <= TURN;
 
       elsif state_r = TURN then
         if is_turning_r = '0' then
-          zeros_r    <= zeros_r - 1;
-          next_short := short_r;
+          zeros_r <= zeros_r - 1;
           if zeros_r = 1 then
-            is_turning_r <= '1';
+            is_turning_r  <= '1';
+            is_counting_r <= '1';
           end if;
-        end if;
-        if (is_turning_r = '1' or is_offset = '1') and index_r /= 2**INDEX_BITS-1 then
-          next_index := index_r + 1;
         end if;
 
         step     := DIFFERENCES(to_integer(index_r));
@@ -317,8 +321,9 @@ begin
         end if;
 
         if count_r = 0 then
-          is_turning_r <= '0';
-          state_r      <= SUBTRACT;
+          is_turning_r  <= '0';
+          is_counting_r <= '0';
+          state_r       <= SUBTRACT;
         else
           count_r <= count_r - 1;
         end if;
@@ -346,8 +351,9 @@ begin
       end if;
 
       if rst_n = '0' then
-        state_r      <= IDLE;
-        is_turning_r <= '0';
+        state_r       <= IDLE;
+        is_turning_r  <= '0';
+        is_counting_r <= '0';
       end if;
     end if;
   end process control;

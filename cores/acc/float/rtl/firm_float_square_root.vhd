@@ -51,13 +51,15 @@ architecture rtl of firm_float_square_root is
   signal is_known_r  : std_logic;
   -- Without the bias.
   signal exponent_r  : signed(RANGE_BITS-1 downto 0);
-  -- Digits of the number, two for each digit of the root; first, the mantissa is in its low bits.
+  -- Digits of the number, two for each digit of the root; first, the mantissa, or twice the mantissa if the exponent is
+  -- odd. The first two digits of a number from 1 to 2 are 01; those of twice this number, 10 or 11.
   signal number_r    : unsigned(MANTISSA_BITS+1 downto 0);
   -- The number so far, less the square of the root so far: at most twice the root.
   signal remainder_r : unsigned(DIGITS downto 0);
   signal root_r      : unsigned(DIGITS-1 downto 0);
 
   signal is_even     : boolean;
+  signal is_normal   : boolean;
   signal exponent    : signed(RANGE_BITS-1 downto 0);
   signal left        : unsigned(0 downto 0);
   signal magnitude   : unsigned(DIGITS downto 0);
@@ -69,13 +71,14 @@ begin
   out_valid <= valid;
 
   is_even   <= exponent_r(0) = '0';
+  is_normal <= number_r(MANTISSA_BITS+1) = '1' or (is_even and number_r(MANTISSA_BITS) = '1');
   exponent  <= (exponent_r(RANGE_BITS-1) & exponent_r(RANGE_BITS-1 downto 1)) + BIAS;
   left(0)   <= '0' when remainder_r = 0 else '1';
   magnitude <= root_r & left;
 
   extract : process (clk)
     variable mantissa   : unsigned(MANTISSA_BITS downto 0);
-    variable number     : unsigned(MANTISSA_BITS+1 downto 0);
+    variable unbiased   : signed(RANGE_BITS-1 downto 0);
     variable extended   : unsigned(DIGITS+2 downto 0);
     variable difference : unsigned(DIGITS+2 downto 0);
   begin
@@ -87,8 +90,12 @@ begin
         sign_r      <= in_number(in_number'left);
         kind_r      <= kind_of(in_number, EXPONENT_BITS);
         is_known_r  <= '0';
-        exponent_r  <= exponent_of(in_number, EXPONENT_BITS, RANGE_BITS) - BIAS;
+        unbiased    := exponent_of(in_number, EXPONENT_BITS, RANGE_BITS) - BIAS;
+        exponent_r  <= unbiased;
         number_r    <= '0' & mantissa;
+        if unbiased(0) = '1' then
+          number_r <= mantissa & '0';
+        end if;
         remainder_r <= (others => '0');
         root_r      <= (others => '0');
         if mantissa = 0 then
@@ -107,19 +114,16 @@ begin
           is_busy_r <= '0';
         end if;
 
-      elsif is_known_r = '0' and number_r(MANTISSA_BITS) = '0' and count_r = DIGITS-1 then
-        number_r   <= shift_left(number_r, 1);
+      elsif is_known_r = '0' and not is_normal and count_r = DIGITS-1 then
+        if is_even then
+          number_r <= shift_left(number_r, 2);
+        end if;
         exponent_r <= exponent_r - 1;
 
       else
-        number := number_r;
-        -- The first two digits of a number from 1 to 2 are 01; those of twice this number, 10 or 11.
-        if count_r = DIGITS-1 and not is_even then
-          number := shift_left(number, 1);
-        end if;
-        extended    := remainder_r & number(MANTISSA_BITS+1 downto MANTISSA_BITS);
+        extended    := remainder_r & number_r(MANTISSA_BITS+1 downto MANTISSA_BITS);
         difference  := extended - (root_r & "01");
-        number_r    <= shift_left(number, 2);
+        number_r    <= shift_left(number_r, 2);
         root_r      <= root_r(DIGITS-2 downto 0) & not difference(DIGITS+2);
         remainder_r <= difference(DIGITS downto 0);
         if difference(DIGITS+2) = '1' then
