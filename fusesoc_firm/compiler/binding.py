@@ -8,7 +8,7 @@ from itertools import chain
 
 from fusesoc_firm.compiler.graph import LEAVES, Node
 from fusesoc_firm.compiler.operators import is_operator
-from fusesoc_firm.compiler.schedule import TRANSPARENT, Schedule
+from fusesoc_firm.compiler.schedule import TRANSPARENT, Issue, Schedule, Unit
 
 _FOR_EVER = 1 << 30
 
@@ -22,7 +22,7 @@ class Use:
     step: int
 
 
-@dataclass
+@dataclass(eq=False)
 class Register:
     """A register and the values that it holds, one after the other; it is free after the step `last`."""
 
@@ -40,6 +40,15 @@ class Binding:
     by_node: dict[int, Register] = field(default_factory=dict)
     # The values of pipelines that are read in later stages, each with the last one.
     delayed: dict[int, tuple[Node, int]] = field(default_factory=dict)
+
+    def source(self, issue: Issue, operand: Node) -> Unit | Register | Node:
+        """Return where an operation reads an operand: at a unit, in a register, or the value itself."""
+        (read, *_) = _read(operand)
+        time = self.schedule.times.get(read.number)
+        if time is None or (time.phase, time.step) != (issue.node.phase, issue.start):
+            return self.by_node.get(read.number, read)
+        own = self.schedule.issues.get(read.number)
+        return own.unit if own else read
 
     def delays(self) -> Iterator[tuple[Node, int]]:
         """Yield each value that a pipeline hands on from one stage to the next, with the number of the latter."""

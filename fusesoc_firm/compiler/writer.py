@@ -9,12 +9,13 @@ from typing import Any
 
 from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
 from fusesoc_firm.compiler.binding import Binding, Register
-from fusesoc_firm.compiler.graph import LEAVES, Node
+from fusesoc_firm.compiler.graph import LEAVES, Node, Place
 from fusesoc_firm.compiler.interface import Elements, Part
 from fusesoc_firm.compiler.kinds import BOOL, INT, bits_of
 from fusesoc_firm.compiler.operators import Operator, is_operator
 from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.schedule import TRANSPARENT, Issue, Unit
+from fusesoc_firm.compiler.selection import selected
 from fusesoc_firm.compiler.streaming import is_streamed, length_of
 from fusesoc_firm.compiler.values import Stream
 from fusesoc_firm.converter.message_ports import MessagePort
@@ -236,7 +237,10 @@ class Writer:
                 else f"sent_r({item['number']})"
                 for item in answers
             ),
-            "holds": self._holds(),
+            "holds": [
+                {"step": step, "condition": " and ".join(conditions)}
+                for step, conditions in sorted(self._waits().items())
+            ],
             "jumps": self._jumps(),
             "pipelines": [
                 self._pipeline(loop) for loop in self.program.loops if 2 * loop.number + 1 in self.schedule.depths
@@ -302,24 +306,29 @@ class Writer:
 
     def _unit(self, unit: Unit) -> Context:
         operator, base = unit.operator, self._names[unit]
-        issues = [item for item in self.schedule.issues.values() if item.unit == unit]
-        steps = [self.bases[item.node.phase] + item.ready for item in issues]
+        issues = sorted((item for item in self.schedule.issues.values() if item.unit == unit), key=self._step)
+        flow = " and ".join(self._names["flow", phase] for phase in self._pipelines_of(unit))
         return {
             "name": base,
             "entity": operator.entity,
             "generics": [{"name": name, "value": value} for name, value in operator.generics],
             "operands": [
-                {"port": port, "signal": signal}
-                for port, signal in zip(operator.inputs, self._operand_names(unit), strict=True)
+                {"port": port, "signal": signal, "values": values}
+                for port, signal, values in zip(
+                    operator.inputs, self._operand_names(unit), self._selected(issues), strict=True
+                )
             ],
+            "operations": [{"step": self._step(item), "place": _described(item.node.place)} for item in issues],
             "outputs": _outputs(operator, f"{base}_result"),
             "result": f"{base}_result",
             "type": vhdl_type(operator.width),
             "has_wait": operator.has_wait,
             "is_pipeline": not operator.has_wait,
-            "taken": " or ".join(f"at_step_r({step})" for step in sorted(steps)),
-            "flow": " and ".join(self._names["flow", phase] for phase in self._pipelines_of(unit)) or "'1'",
-            "starts": " or ".join(f"at_step_r({self.bases[item.node.phase] + item.start})" for item in issues),
+            "taken": self._results_taken(unit, issues),
+            "flow": flow or "'1'",
+            "stalled": [{"flow": flow}] if flow else [],
+            "starts": " or ".join(f"at_step_r({self._step(item)})" for item in issues),
+            "loads": " or ".join(map(self._load, issues)),
         }
 
     def _pipelines_of(self, unit: Unit) -> list[int]:
@@ -334,9 +343,6 @@ class Writer:
         names = {name: self._names[name, phase] for name in _OF_PIPELINE}
         held = [f"{names['token']}({depth}) and not {ready}" for ready in self._readies(loop)]
         lines: list[tuple[str, str, Node | None]] = []
-        for item in self.schedule.issues.values():
-            if item.node.phase == phase:
-                lines += self._operands(item)
         for node, stage in self.binding.delays():
             if node.phase == phase:
                 lines.append((self._names["delayed", node.number, stage], self.value(node, phase, stage - 1), None))
@@ -358,8 +364,8 @@ class Writer:
             ready = f"{sent.part.element}_ready"
             yield f"({ready} or {_dropped(answer)})" if _may_be_dropped(answer) else ready
 
-    def _holds(self) -> list[Context]:
-        """Return the steps that wait, each with the condition that ends the wait."""
+    def _waits(self) -> dict[int, list[str]]:
+        """Return the conditions that each step waits for."""
         found: dict[int, list[str]] = {}
         for phase, count in enumerate(self.schedule.steps):
             if count and phase % 2 == 0 and (phase == 0 or self.streams):
@@ -377,7 +383,7 @@ class Writer:
                 step = self.bases[item.node.phase] + item.ready
                 found.setdefault(step, []).append(f"{self._names[item.unit]}_valid")
         found.setdefault(self.last, []).append("accepted")
-        return [{"step": step, "condition": " and ".join(conditions)} for step, conditions in sorted(found.items())]
+        return found
 
     def _segment(self, number: int) -> str:
         """Return the condition that the fields of a segment are valid; no field may follow the last array."""
@@ -417,9 +423,6 @@ class Writer:
             text = self.fitted(node, bits, phase, step)
             found.setdefault(self.bases[phase] + step, []).append((target, text, node))
 
-        for item in self.schedule.issues.values():
-            if item.node.phase not in self.schedule.depths:
-                found.setdefault(self.bases[item.node.phase] + item.start, []).extend(self._operands(item))
         for number, register in self.binding.by_node.items():
             node = self.program.graph.nodes[number]
             time = self.schedule.times[number]
@@ -432,15 +435,46 @@ class Writer:
                 assert carried.next is not None
                 if carried.next is not carried.value and phase not in self.schedule.depths:
                     load(phase, self.schedule.steps[phase] - 1, target, carried.next, carried.value.bits)
-        held = {item["step"] for item in self._holds()}
+        held = self._waits()
         return [
             {"step": step, "is_held": step in held, "lines": _commented(lines)} for step, lines in sorted(found.items())
         ]
 
-    def _operands(self, issue: Issue) -> Iterator[tuple[str, str, Node | None]]:
-        """Yield the operands of an operation: the register, the value, and the operation."""
-        for target, operand in zip(self._operand_names(issue.unit), issue.node.operands, strict=True):
-            yield target, self._operand(issue, operand), issue.node
+    def _results_taken(self, unit: Unit, issues: Sequence[Issue]) -> str:
+        """Return the condition that the result of a unit is taken: at the end of the step that waits for it.
+
+        A step that waits for nothing else ends with the result.
+        """
+        waits, valid = self._waits(), f"{self._names[unit]}_valid"
+        steps = sorted(self.bases[item.node.phase] + item.ready for item in issues)
+        return " or ".join(
+            f"at_step_r({step})" if waits.get(step) == [valid] else f"(at_step_r({step}) and advance)" for step in steps
+        )
+
+    def _selected(self, issues: Sequence[Issue]) -> list[list[Context]]:
+        """Return the values of each operand of a unit, each with the condition that selects it."""
+        return [
+            [
+                {
+                    "value": text,
+                    "condition": " or ".join(f"at_step_r({self._step(item)})" for item in chosen),
+                    "is_choice": len(sources) > 1,
+                }
+                for text, chosen in sources.items()
+            ]
+            for sources in selected(issues, self._operand)
+        ]
+
+    def _load(self, issue: Issue) -> str:
+        """Return the condition that a unit takes operands: at the end of a step, in which it may hold a result."""
+        step = self._step(issue)
+        conditions = [] if issue.node.phase in self.schedule.depths else self._waits().get(step, [])
+        return f"({' and '.join([f'at_step_r({step})', *conditions])})" if conditions else f"at_step_r({step})"
+
+    def _step(self, issue: Issue) -> int:
+        """Return the step of an operation, counted from the begin of the program; a pipeline is one step."""
+        phase = issue.node.phase
+        return self.bases[phase] + (0 if phase in self.schedule.depths else issue.start)
 
     def _operand(self, issue: Issue, operand: Node) -> str:
         """Return an operand of a unit; an integer has the unit's width."""
@@ -645,6 +679,10 @@ class Writer:
             "taken": self._taken(loop) if loop else "",
             "numbers": numbers,
         }
+
+
+def _described(place: Place | None) -> str:
+    return f", line {place.line}: {place.text[:_LONGEST_COMMENT]}" if place else ""
 
 
 def _stream(part: Part) -> Context:

@@ -60,6 +60,15 @@ def scaled(m):
     return {"points": points, "tail": len(m.points) + m.tail}
 """,
     ),
+    # The last sum of an element stays at its adder while the element waits for the publisher.
+    "ratios": (
+        "Points",
+        "",
+        """
+def ratios(m):
+    return {"points": [{"x": p.x / p.y + 1.0, "y": p.x + p.y - m.first} for p in m.points], "tail": m.tail}
+""",
+    ),
     "coloured": (
         "Points",
         "",

@@ -17,12 +17,11 @@ from fusesoc_firm.compiler.interface import Elements, Part
 from fusesoc_firm.compiler.kinds import BOOL
 from fusesoc_firm.compiler.operators import Cost, is_operator
 from fusesoc_firm.compiler.schedule import TRANSPARENT, Schedule, Unit
+from fusesoc_firm.compiler.selection import selected
 
-# An operator beside registers and multiplexers needs more LUT4 than alone.
-_BESIDE = 1.07
-# LUT4 for each bit: of a further source of an operand, of comparisons of two floats or of one with a constant, and of
-# the other operations between registers.
-_SOURCE, _COMPARISON, _BOUND, _CHOICE, _SUM, _QUIET = 0.8, 3.6, 2.0, 1.0, 1.0, 1.2
+# LUT4 for each bit: of each of several sources of an operand, of comparisons of two floats or of one with a constant,
+# and of the other operations between registers.
+_SOURCE, _COMPARISON, _BOUND, _CHOICE, _SUM, _QUIET = 0.65, 3.6, 2.0, 1.0, 1.0, 1.2
 # LUT4 for each step in which registers are loaded, and for each bit of an array's element.
 _STEP, _ELEMENT = 2.0, 2.0
 # The time in ns from one register to the next one without logic.
@@ -51,7 +50,7 @@ def estimate(schedule: Schedule) -> Estimate:
     """Return the estimate of a schedule's entity."""
     binding = bound(schedule)
     units = [_cost(unit) for unit in schedule.units]
-    lut = _BESIDE * sum(cost.lut for cost in units) + _logic(schedule) + _selections(schedule) + _control(schedule)
+    lut = sum(cost.lut for cost in units) + _logic(schedule) + _selections(binding) + _control(schedule)
     ff = sum(cost.ff for cost in units) + _registers(binding)
     dsp = sum(cost.dsp for cost in units) + sum(map(_multipliers, schedule.program.needed()))
     return Estimate(round(lut), ff, dsp, _clock(schedule))
@@ -93,19 +92,20 @@ def _multipliers(node: Node) -> int:
     return one * other
 
 
-def _selections(schedule: Schedule) -> float:
+def _selections(binding: Binding) -> float:
     """Return the LUT4 that choose the operands of operators, and the elements of lists."""
-    found = sum(_SOURCE * unit.operator.operand * (count - 1) for unit, count in _choices(schedule) if count > 1)
-    listed = (node for answer in schedule.program.answers for sent in answer.parts for node in sent.listed())
+    found = sum(_SOURCE * unit.operator.operand * count for unit, count in _choices(binding) if count > 1)
+    answers = binding.schedule.program.answers
+    listed = (node for answer in answers for sent in answer.parts for node in sent.listed())
     return found + sum(_SOURCE * node.bits for node in listed if not node.is_constant)
 
 
-def _choices(schedule: Schedule) -> Iterator[tuple[Unit, int]]:
-    """Yield the number of values among which each operand of each operator is chosen."""
-    for unit in schedule.units:
-        nodes = [item.node for item in schedule.issues.values() if item.unit == unit]
-        for place in range(len(unit.operator.inputs)):
-            yield unit, len({node.operands[place].number for node in nodes})
+def _choices(binding: Binding) -> Iterator[tuple[Unit, int]]:
+    """Yield the number of places from which each operand of each operator comes; constants need few cells."""
+    for unit in binding.schedule.units:
+        issues = [item for item in binding.schedule.issues.values() if item.unit == unit]
+        for sources in selected(issues, binding.source):
+            yield unit, sum(not isinstance(item, Node) or not item.is_constant for item in sources)
 
 
 def _control(schedule: Schedule) -> float:

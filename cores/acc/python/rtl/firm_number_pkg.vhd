@@ -27,6 +27,9 @@ package firm_number_pkg is
   function chosen(condition : std_logic; one, other : std_logic_vector) return std_logic_vector;
   function chosen(condition, one, other : std_logic) return std_logic;
 
+  -- The number if the condition is '1', else zeros: of numbers of which one at most is selected, the others are zeros.
+  function gated(condition : std_logic; number : std_logic_vector) return std_logic_vector;
+
   -- Floating-point numbers: the sign is the highest bit, and EXPONENT_BITS follow.
   function negated(number : std_logic_vector) return std_logic_vector;
   function magnitude(number : std_logic_vector) return std_logic_vector;
@@ -109,6 +112,13 @@ package body firm_number_pkg is
     end if;
     return other;
   end function chosen;
+
+  function gated(condition : std_logic; number : std_logic_vector) return std_logic_vector is
+    variable mask : std_logic_vector(number'length-1 downto 0);
+  begin
+    mask := (others => condition);
+    return number and mask;
+  end function gated;
 
   function negated(number : std_logic_vector) return std_logic_vector is
     variable result : std_logic_vector(number'length-1 downto 0);
