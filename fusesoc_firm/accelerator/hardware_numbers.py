@@ -22,7 +22,7 @@ import numpy as np
 from fusesoc_firm.accelerator.message import Message
 from fusesoc_firm.compiler.fixed import FixedNumber, Format, format_of
 from fusesoc_firm.compiler.functions import CALLS, CONSTANTS
-from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64, INTEGERS, number_of
+from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64, INTEGERS, floor_number, number_of, whole_number
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
@@ -34,7 +34,6 @@ _OPERATORS = {
 }
 _ENCODINGS = {DataKind.STRING: "utf-8", DataKind.WSTRING: "utf-16-le"}
 _IMPORTS = (ast.Import, ast.ImportFrom)
-_LEAST, _MOST = -(1 << 63), (1 << 63) - 1
 
 
 def typed(frame: Frame, message: Mapping[str, Any], numbers: str = "") -> Message:
@@ -230,18 +229,6 @@ def _real(function: Callable[..., Any], *values: Any) -> Any:
     return made if any(isinstance(value, np.float64) for value in values) else made.item()
 
 
-def _whole(value: Any, rounding: Callable[[Any], int]) -> int:
-    """Return a number as an integer of 64 bits: the nearest one, and 0 for NaN."""
-    if isinstance(value, float | np.floating) and not math.isfinite(value):
-        return 0 if math.isnan(value) else _MOST if value > 0 else _LEAST
-    return min(max(rounding(value), _LEAST), _MOST)
-
-
-def _floor(value: Any) -> int:
-    whole = _whole(value, math.trunc)
-    return whole - bool(value < whole)
-
-
 def _hypotenuse(*values: Any) -> Any:
     squares = [_real(np.multiply, value, value) for value in values]
     total = squares[0]
@@ -294,9 +281,9 @@ _MATH: Mapping[str, Callable[..., Any]] = {
     "sqrt": square_root,
     "fabs": lambda value: _real(np.fabs, value),
     "copysign": lambda value, sign: _real(np.copysign, value, type(sign)(1) if math.isnan(sign) else sign),
-    "floor": _floor,
-    "ceil": lambda value: -_floor(-value),
-    "trunc": lambda value: _whole(value, math.trunc),
+    "floor": floor_number,
+    "ceil": lambda value: -floor_number(-value),
+    "trunc": whole_number,
     "hypot": _hypotenuse,
     "atan2": _angle,
     # Python has it from 3.13 on.
@@ -316,8 +303,10 @@ _NUMPY: Mapping[str, Callable[..., Any]] = {
     name: _of_numpy(_MATH[name]) for name in ("sin", "cos", "tan", "exp", "log")
 }
 _BUILTINS: Mapping[str, Callable[..., Any]] = {
-    "int": lambda value=0: _whole(value, int) if isinstance(value, float | np.floating) else int(value),
-    "round": lambda value: _whole(value, round) if isinstance(value, float | np.floating | FixedNumber) else value,
+    "int": lambda value=0: whole_number(value, int) if isinstance(value, float | np.floating) else int(value),
+    "round": lambda value: (
+        whole_number(value, round) if isinstance(value, float | np.floating | FixedNumber) else value
+    ),
 }
 
 

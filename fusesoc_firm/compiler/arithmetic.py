@@ -35,10 +35,12 @@ from fusesoc_firm.compiler.kinds import (
     INTEGERS,
     Kind,
     fixed_kind,
+    floor_number,
     integer_pair,
     number_of,
     pair_of,
     result_kind,
+    whole_number,
 )
 from fusesoc_firm.compiler.models import modelled
 
@@ -518,7 +520,7 @@ class Arithmetic:
         if not value.kind.is_float:
             return self._to(value, INT)
         if value.is_constant:
-            return self._to_integer(value, "", math.floor)
+            return self.graph.constant(floor_number(value.payload))
         whole = self.truncated(value)
         is_above = self._less(value, self.graph.node("to_float", (whole,), value.kind))
         return self._integer("subtract", whole, self._to(is_above, INT), INT)
@@ -531,10 +533,7 @@ class Arithmetic:
 
     def _to_integer(self, value: Node, rounding: str, folded: Callable[[Any], int]) -> Node:
         if value.is_constant:
-            try:
-                return self.graph.constant(folded(value.payload))
-            except (ArithmeticError, ValueError) as error:
-                raise RefusalError(f"the constant cannot be computed: {error}") from None
+            return self.graph.constant(whole_number(value.payload, folded))
         return self.graph.node("to_integer", (value,), INT, rounding, INT.limits)
 
     def is_nan(self, value: Node) -> Node:

@@ -137,6 +137,20 @@ def result_kind(operation: Callable[..., Any], *kinds: Kind) -> Kind:
         return kind_of(operation(*(number_of(kind, 1) for kind in kinds)))
 
 
+def whole_number(value: Any, rounding: Callable[[Any], int] = math.trunc) -> int:
+    """Return a float or a fixed-point number as an integer of 64 bits: the nearest one beyond them, and 0 for NaN."""
+    least, most = INT.limits
+    if isinstance(value, float | np.floating) and not math.isfinite(value):
+        return 0 if math.isnan(value) else most if value > 0 else least
+    return min(max(rounding(value), least), most)
+
+
+def floor_number(value: Any) -> int:
+    """Return the largest integer that is not above a float, from its integer of 64 bits."""
+    whole = whole_number(value)
+    return whole - bool(value < whole)
+
+
 def units_of(value: Any) -> int:
     """Return the integer that hardware has for an integer, a truth value or a fixed-point number."""
     return value.units if isinstance(value, FixedNumber) else int(value)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NoReturn
@@ -18,9 +19,11 @@ from fusesoc_firm.compiler.paths import Carried, Loop
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.streaming import late, problems
 from fusesoc_firm.compiler.values import Array, Class, Function, Instance, Named, Record, Value, described
-from fusesoc_firm.text.diagnostics import nearest
+from fusesoc_firm.text.diagnostics import InputError, nearest
 
 _MOST_ROUNDS = 20
+# The attributes on the path of a state.
+_NAME = re.compile(r"\.(\w+)")
 
 
 @dataclass
@@ -119,17 +122,46 @@ class Task:
 def compile_function(task: Task) -> Program:
     """Return the program of a function, or of a callable object, of a source. May raise `InputError`.
 
-    The function is run until the kinds of its states are known.
+    The function is run until the kinds of its states are known. Unknown states have their first values.
     """
     states: dict[str, tuple[Kind, int, int]] = {}
     for _ in range(_MOST_ROUNDS):
-        run = _Run(task, states)
+        try:
+            run = _Run(task, states)
+        except InputError as error:
+            # The first value may be refused where later ones are not: a quotient by zero.
+            states |= _assumed(task, states, error)
+            continue
         wider = run.changes()
         if not wider:
             return run.program()
         states |= wider
     source = task.source
     return source.refuse(source.module, "the types of the states cannot be determined", "give them a type of NumPy")
+
+
+def _assumed(
+    task: Task, states: dict[str, tuple[Kind, int, int]], error: InputError
+) -> dict[str, tuple[Kind, int, int]]:
+    """Return further states: attributes that a method changes. Raise `error` if they do not help."""
+    try:
+        found = _Run(task, states, _changed_attributes(task.source.module)).changes()
+    except InputError:
+        raise error from None
+    if not found:
+        raise error
+    return found
+
+
+def _changed_attributes(module: ast.Module) -> set[str]:
+    """Return the attributes to which, or to whose elements, a function assigns, except for those that construct."""
+    functions = [node for node in ast.walk(module) if isinstance(node, ast.FunctionDef) and node.name != "__init__"]
+    targets = [
+        node
+        for node in chain(*map(ast.walk, functions))
+        if isinstance(node, ast.Attribute | ast.Subscript) and isinstance(node.ctx, ast.Store)
+    ]
+    return {node.attr for node in chain(*map(ast.walk, targets)) if isinstance(node, ast.Attribute)}
 
 
 def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
@@ -139,10 +171,11 @@ def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
 
 
 class _Run:
-    """One run of the function with states of given kinds."""
+    """One run of the function with states of given kinds; the attributes `assumed` are states, too, of first kinds."""
 
-    def __init__(self, task: Task, states: dict[str, tuple[Kind, int, int]]) -> None:
+    def __init__(self, task: Task, states: dict[str, tuple[Kind, int, int]], assumed: Collection[str] = ()) -> None:
         self.name, self.inputs, self.outputs, self.states = task.name, task.inputs, task.outputs, states
+        self.assumed = {*assumed}
         self.interpreter = Interpreter(task.source, on_global=self._enter)
         self.graph = self.interpreter.graph
         self.graph.format = task.numbers.format if task.numbers else None
@@ -187,8 +220,11 @@ class _Run:
         """Note the first values of the objects that a name of the module has, and put states in their place."""
         for path, owner, key, value in self._cells(name):
             self.first[path] = value
-            if path in self.states:
-                kind, *limits = self.states[path]
+            known = self.states.get(path)
+            if known is None and isinstance(value, Node) and not self.assumed.isdisjoint(_NAME.findall(path)):
+                known = value.kind, value.low, value.high
+            if known:
+                kind, *limits = known
                 leaf = self.graph.leaf("state", kind, path, (limits[0], limits[1]))
                 self.leaves[path] = leaf
                 self.interpreter.memory.cells[owner][key] = leaf

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.fixed import MOST_BITS
+from fusesoc_firm.compiler.writer import Writer
 from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import Unit, differences, message_frame, random_messages, simulated
 from tests.compiler.random_functions import RandomFunction
@@ -73,6 +75,42 @@ def limits(m):
         "v": [max(m.v[2], -m.v[2]), min(m.v[2], -m.v[2]), m.v[0]],
     }
 """,
+    # What is computed with the first value of a state is not a constant that may be refused.
+    "begun": """
+class Begun:
+    def __init__(self):
+        self.last = 0.0
+        self.past = [0, 1]
+        self.parts = [2.0, 4]
+
+    def __call__(self, m):
+        answer = {"a": 1.0 / self.last, "b": m.a / self.past[0], "i": m.i // self.past[0], "v": [*self.parts, 0.0]}
+        self.last = m.a
+        self.past[0] += 1
+        return answer
+
+
+begun = Begun()
+""",
+    # A state is a constant at first, and not a number later.
+    "beyond": """
+import math
+
+
+class Beyond:
+    def __init__(self):
+        self.x = 1e300
+
+    def __call__(self, m):
+        self.x = self.x * self.x - self.x * self.x
+        return {
+            "n": int(self.x), "a": float(int(1e30)), "b": float(math.floor(-1e30)), "w": [int(math.nan), 0, 0, 0],
+            "v": [float(round(math.inf)), float(math.ceil(1e30)), self.x],
+        }
+
+
+beyond = Beyond()
+""",
     # A value that is used again after its neighbours have appeared needs its own register.
     "reused": """
 def reused(m):
@@ -98,6 +136,11 @@ class State:
 state = State()
 """,
 }
+
+_QUOTIENTS = """
+def quotients(m):
+    return {"a": m.a / m.b, "b": m.b / m.v[0], "v": [m.b / m.a, m.v[0] / m.b, m.a - m.b]}
+"""
 
 _FIXED = {
     "filtered": """
@@ -180,7 +223,9 @@ def check(units: list[Unit], messages: int, folder: Path, seed: int) -> None:
 
 @pytest.mark.check
 def test_functions_answer_as_python_does(tmp_path: Path) -> None:
-    check([Unit(name, text) for name, text in _FUNCTIONS.items()], 40, tmp_path, _SEED)
+    units = [Unit(name, text) for name, text in _FUNCTIONS.items()]
+    # Both quotients are awaited in one step, and take longer with subnormal numbers.
+    check([*units, Unit("quotients", _QUOTIENTS, limits={"divide": 2})], 40, tmp_path, _SEED)
 
 
 @pytest.mark.check
@@ -294,6 +339,15 @@ def test_more_units_take_fewer_steps() -> None:
     assert [sum(item.steps) for item in (one, two)] == sorted([sum(one.steps), sum(two.steps)], reverse=True)
     assert sum(two.steps) < sum(one.steps)
     assert len(one.units) == 2
+
+
+def test_operands_are_exchanged_if_the_operator_then_chooses_among_fewer_values() -> None:
+    text = "def f(m):\n    return {'a': m.a + m.b, 'b': m.b + m.v[0], 'v': [m.v[0] - m.b, m.a * 2.0, m.b * 0.5]}\n"
+    units = Writer(bound(Unit("f", text).schedule())).configuration("f", [], 8)["units"]
+    found = {unit["name"]: [[item["value"] for item in one["values"]] for one in unit["operands"]] for unit in units}
+    # Differences keep their order: the sign of the second operand is inverted.
+    assert found["add_64_0"] == [["in_a", "in_v(63 downto 0)"], ["in_b", "negated(in_b)"]]
+    assert found["multiply_64_0"][0] == ["in_a", "in_b"]
 
 
 def test_an_index_that_nobody_reads_is_no_register() -> None:
