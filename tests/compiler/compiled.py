@@ -208,11 +208,12 @@ def random_messages(source: random.Random, count: int) -> list[dict[str, Any]]:
 
 
 def _random(leaf: Any, source: random.Random) -> Any:
-    values = [_random_number(leaf.kind.name, leaf.kind.limits, source) for _ in range(leaf.count)]
+    values = [random_number(leaf.kind.name, leaf.kind.limits, source) for _ in range(leaf.count)]
     return values if leaf.is_array else values[0]
 
 
-def _random_number(name: str, limits: tuple[int, int], source: random.Random) -> Any:
+def random_number(name: str, limits: tuple[int, int], source: random.Random) -> Any:
+    """An ordinary, special or subnormal number of a type; an integer is within the limits."""
     if name == "bool":
         return source.random() < 0.5
     if name.startswith("float"):
