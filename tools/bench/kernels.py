@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.compiler.schedule import scheduled
 from fusesoc_firm.exploration.report import Report
-from fusesoc_firm.system.hardware.compiled import entity_of, program_of, resources_of
+from fusesoc_firm.system.hardware.compiled import entity_of, schedule_of
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.render import render
 from tests.hdl.ghdl import REPOSITORY, GhdlError, Library, core_files
@@ -172,7 +171,7 @@ def compiled(kernel: Kernel) -> Compiled:
     loaded = load_beside(kernel.spec, [messages] if messages.is_dir() else [])
     (type_,) = (item.own for item in loaded.system.accelerator_types if str(item.accelerator.name) == kernel.name)
     begin = time.perf_counter()
-    schedule = scheduled(program_of(type_, loaded.folder, kernel.numbers), resources_of(type_))
+    schedule = schedule_of(type_, loaded.folder, kernel.numbers)
     made = entity_of(type_, schedule)
     vhdl = render(made.template, made.context)
     seconds = time.perf_counter() - begin

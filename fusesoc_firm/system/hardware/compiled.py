@@ -46,9 +46,12 @@ def compiler_files() -> list[Path]:
     return [*table_files(), table_files()[0].with_name("model.py")]
 
 
-def schedule_of(type_: AcceleratorType, folder: Path) -> Schedule:
-    """Return the scheduled function of an accelerator. Raise `InputError` for a limit that it cannot meet, too."""
-    program, limits = program_of(type_, folder), _limits(type_)
+def schedule_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Schedule:
+    """Return the scheduled function of an accelerator, whose floats have the type `numbers`, if it is given.
+
+    Raise `InputError` for a limit that the function cannot meet, too.
+    """
+    program, limits = program_of(type_, folder, numbers), _limits(type_)
     try:
         if not budget_of(type_):
             return fastest_within(program, resources_of(type_), limits)
