@@ -172,7 +172,7 @@ _METHODS = {
         runs `{yosys.ECP5.synthesis}` for ECP5 and `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*`
         run the same commands with the installed Yosys.""",
     "kernels": """The [demo systems](../reference/applications.md) with `type: Python`, and functions in
-        tools/bench/kernels, are compiled with one operator of each kind
+        tools/bench/kernels, are compiled with one operator of each kind, or with as many as their `latency` needs
         ([Accelerators in Python](../reference/python.md)). The entity of each is measured without converters. LUT4, FF
         and MHz are measured as in [Timing](timing.md#timing). `make bench BENCH='kernels --row pid'` measures only
         the rows whose names match. `HOLOSO=PYTHON` names a Python with

@@ -1,6 +1,6 @@
 """Cells, clock, cycles and compile time of accelerators in Python: those of specs/, and the functions of `kernels/`.
 
-Each is placed alone, with one operator of each kind unless its specification gives others.
+Each is placed alone, with the operators that its specification selects: one of each kind, unless it has limits.
 """
 
 from __future__ import annotations
