@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from fusesoc_firm.compiler.expressions import Expressions
 from fusesoc_firm.compiler.functions import CALLS, called
 from fusesoc_firm.compiler.graph import Node
+from fusesoc_firm.compiler.names import bound_names
 from fusesoc_firm.compiler.values import (
     Array,
     Class,
@@ -26,6 +27,14 @@ from fusesoc_firm.text.diagnostics import nearest
 
 _DEEPEST = 50
 EXTREMES = ("min", "max")
+# What a function of NumPy that chooses or combines arrays becomes.
+_REMEDIES = {
+    "where": "use 'a if condition else b'",
+    "clip": "use 'min(max(value, low), high)'",
+    "dot": "write the sum of products, in a loop over 'range'",
+    "array": "use a list",
+    "zeros": "use a list: [0.0] * 4",
+}
 
 
 @dataclass
@@ -142,12 +151,22 @@ class Calls(Expressions):
         begin = next(
             (item for item in definition.body if isinstance(item, ast.FunctionDef) and item.name == "__init__"), None
         )
+        self._set_class_attributes(made)
         if begin:
             self.call(Function(begin, made), values, named, node)
         elif values or named:
             self.refuse(node, f"'{definition.name}' takes no values")
         instance: Instance = made
         return instance
+
+    def _set_class_attributes(self, made: Instance) -> None:
+        """Give an object the values of its class that its methods change, which are its own from then on."""
+        nodes = (node for node in ast.walk(made.type) if isinstance(node, ast.Attribute))
+        changed = {node.attr for node in nodes if isinstance(node.ctx, ast.Store)}
+        for item in made.type.body:
+            if isinstance(item, ast.Assign | ast.AnnAssign) and item.value:
+                for name in sorted(changed.intersection(bound_names(item))):
+                    self.memory.cells[made][name] = self.expression(item.value)
 
     def _known_call(self, name: str, node: ast.Call) -> Value:
         """Return the result of a function of Python, `math` or NumPy."""
@@ -171,7 +190,9 @@ class Calls(Expressions):
                 self.refuse(node, "'print' is not hardware", "remove it")
             known = [item.rpartition(".")[2] for item in CALLS if item.rpartition(".")[0] == module]
             hint = (
-                nearest(name.rpartition(".")[2], known)
+                _REMEDIES.get(name.rpartition(".")[2])
+                or ("return the fields of the message: {'data': ...}" if module.endswith(".msg") else "")
+                or nearest(name.rpartition(".")[2], known)
                 or f"functions of hardware: {', '.join(sorted(known)) or 'of math'}"
             )
             self.refuse(node, f"'{name}' is not hardware", hint)

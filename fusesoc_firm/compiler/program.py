@@ -251,8 +251,10 @@ class _Run:
         for path in self.first.keys() - after.keys():
             self._refuse(f"'{path}' is lost with a message", "keep the number of elements of lists")
         for path, value in after.items():
-            if path not in self.first:
+            if path not in self.first and path.endswith("]"):
                 self._refuse(f"'{path}' grows with each message", "use a list of fixed size, and replace its elements")
+            if path not in self.first:
+                self._refuse(f"'{path}' has no value before the first message", "give it one in __init__")
             before = self.leaves.get(path, self.first[path])
             if value is before:
                 if path in self.leaves:
@@ -278,7 +280,18 @@ class _Run:
             self._refuse(f"'{path}' is {error}", "give it one type, as int() or numpy.float32() does")
 
     def _refuse(self, message: str, hint: str = "") -> NoReturn:
-        self.interpreter.refuse(self.node, message, hint)
+        """Refuse the function, or a state with whose path the message begins where the function first sets it."""
+        names = _NAME.findall(message.partition("'")[2].partition("'")[0])
+        place = self._assignment(names[-1]) if names else None
+        self.interpreter.refuse(place or self.node, message, hint)
+
+    def _assignment(self, name: str) -> ast.AST | None:
+        """Return the first place at which a method, except for the one that constructs, sets an attribute."""
+        module = self.interpreter.source.module
+        functions = [item for item in ast.walk(module) if isinstance(item, ast.FunctionDef) and item.name != "__init__"]
+        places = (item for function in functions for item in ast.walk(function) if isinstance(item, ast.Attribute))
+        stores = [item for item in places if item.attr == name and isinstance(item.ctx, ast.Store)]
+        return min(stores, key=lambda item: (item.lineno, item.col_offset), default=None)
 
     def program(self) -> Program:
         """Return the program of this run."""

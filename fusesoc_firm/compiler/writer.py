@@ -28,7 +28,7 @@ TEMPLATE = "vhdl/python_accelerator.vhd"
 # The signals of the template.
 _SIGNALS = """
     step_r at_step_r advance holds is_open is_checked accepted done sent_r
-    firm rtl work ieee operations control clk rst_n
+    firm rtl work ieee run_steps run_operations send_answers clk rst_n
 """.split()
 # The signals of a list whose elements have the name '*'.
 _OF_LIST = ("words_*", "word_*", "index_*_r", "ends_*", "valid_*", "ready_*", "sent_*_r")

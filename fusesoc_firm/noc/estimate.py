@@ -7,8 +7,8 @@ from itertools import pairwise
 
 from fusesoc_firm.noc.network import Flow, Network
 
-# LUT4 for each bit of a beat: of a buffer, and of a further source of an output; and for each further source itself.
-_BUFFER_BIT, _TURN_BIT, _TURN = 1.0, 0.6, 8.0
+# LUT4 of a buffer, and of each further source of an output: for each bit of a beat, and beside the bits.
+_BUFFER_BIT, _BUFFER, _TURN_BIT, _TURN = 0.97, 2.2, 0.74, 15.4
 # LUT4 of a sender beside one for each bit of its messages, and of a source of a merge beside those for its bits.
 _SENDER, _SOURCE = 15, 6
 
@@ -29,13 +29,11 @@ def sender_lut(bits: int) -> int:
 
 def routers_lut(network: Network, width: int) -> int:
     """Return the estimated LUT4 of all routers for streams of `width` bits, of which all beats are full."""
+    # The mark of the last beat, and the destination.
     bits = width + 1 + max(1, (network.endpoints - 1).bit_length())
-    total = 0.0
-    for turns in network.turns:
-        total += _BUFFER_BIT * bits * len({source for source, _ in turns})
-        sources = Counter(sink for _, sink in turns)
-        total += sum((_TURN + _TURN_BIT * bits) * (count - 1) for count in sources.values())
-    return round(total)
+    buffers = sum(len({source for source, _ in turns}) for turns in network.turns)
+    further = sum(count - 1 for turns in network.turns for count in Counter(sink for _, sink in turns).values())
+    return round(buffers * (_BUFFER + _BUFFER_BIT * bits) + further * (_TURN + _TURN_BIT * bits))
 
 
 def delay(network: Network, flow: Flow, sink: int) -> int:

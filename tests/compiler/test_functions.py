@@ -119,8 +119,9 @@ def reused(m):
 """,
     "state": """
 class State:
+    total = 0.0
+
     def __init__(self):
-        self.total = 0.0
         self.count = 0
         self.past = [0.0] * 3
 

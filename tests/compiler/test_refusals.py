@@ -58,6 +58,7 @@ BODIES = [
     ("x = @math.gamma(m.low)", "'math.gamma' is not hardware", "legal here: acos"),
     ("x = @math.sqrt(m.low, 2)", "'math.sqrt' takes 1 numbers", ""),
     ("x = @print(m.n)", "'print' is not hardware", "remove it"),
+    ("x = @math.clip(m.low, 1.0, 2.0)", "'math.clip' is not hardware", r"use 'min\(max"),
     ("x = @math.inf // m.n", "'//' and '%' of floats", "math.floor"),
     ("x = @missing + 1", "the name 'missing' has no value", ""),
     ("x = @m.lwo", "the message has no field 'lwo'", "did you mean 'low'"),
@@ -206,6 +207,22 @@ def test_what_fixed_point_numbers_do_not_hold_is_refused(expression: str, messag
     with pytest.raises(InputError, match=message) as raised:
         compiled(f"return {{'x': {expression}}}", numbers="fixed(12, 4)")
     assert raised.value.diagnostics[0].hint
+
+
+@pytest.mark.parametrize(
+    ("first", "later", "message"),
+    [
+        ("pass", "m.low", r"'state.x' has no value before the first message"),
+        ("self.x = None", "m.low", r"'state.x' is None at first, and a state is a number"),
+        ("self.x = numpy.float32(0.0)", "m.v[0]", r"'state.x' is a float32 and a float64"),
+    ],
+)
+def test_a_state_is_refused_where_it_is_set(first: str, later: str, message: str) -> None:
+    text = f"import numpy\n\nclass State:\n    def __init__(self):\n        {first}\n"
+    text += f"    def __call__(self, m):\n        self.x = {later}\n        return {{}}\n\nstate = State()\n"
+    sides = [side_of("in_", SCAN)], [side_of("out_", ANSWER, "buffered")]
+    with pytest.raises(InputError, match=rf"state\.py:7:9: error: {message}"):
+        compile_function(Task(Source("state.py", text), "state", *sides, kind_named("")))
 
 
 def test_a_recursion_is_refused_at_its_call() -> None:
