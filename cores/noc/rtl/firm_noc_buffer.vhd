@@ -73,6 +73,7 @@ begin
     signal newer_r    : std_logic_vector(BITS-1 downto 0);
     signal older_r    : std_logic_vector(BITS-1 downto 0);
     signal is_newer_r : std_logic;  -- the first word is the newer one
+    signal is_older_r : std_logic;  -- the inverse; apart from it, since each of them drives a whole payload
     signal second_r   : std_logic_vector(CONTROL_BITS-1 downto 0);
     signal is_full_r  : std_logic;  -- `ready_r` is low; apart from it, since that drives many registers
   begin
@@ -87,6 +88,7 @@ begin
           older_r <= newer_r;
         end if;
         is_newer_r <= is_free;
+        is_older_r <= not is_free;
       end if;
     end process move_words;
 
@@ -108,7 +110,7 @@ begin
       end if;
     end process count_words;
 
-    m_payload <= newer_r when is_newer_r = '1' else older_r;
+    m_payload <= older_r when is_older_r = '1' else newer_r;
     second    <= second_r;
     more      <= is_full_r;
   end generate in_registers;
