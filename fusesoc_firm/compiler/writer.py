@@ -10,7 +10,7 @@ from typing import Any
 from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
 from fusesoc_firm.compiler.binding import Binding, Register
 from fusesoc_firm.compiler.graph import LEAVES, Node, Place
-from fusesoc_firm.compiler.interface import Elements, Part
+from fusesoc_firm.compiler.interface import Elements, Part, Side
 from fusesoc_firm.compiler.kinds import BOOL, INT, bits_of
 from fusesoc_firm.compiler.operators import Operator, is_operator
 from fusesoc_firm.compiler.paths import Loop
@@ -217,7 +217,7 @@ class Writer:
             if self._has_signal(node)
         ]
         answers = [self._answer(number, answer) for number, answer in enumerate(self.program.answers)]
-        inputs = [self._input(part) for _, part in self.streams]
+        inputs = [self._input(side, part) for side, part in self.streams]
         states = [self._state(state) for state in self.program.states]
         made = {
             "entity": entity,
@@ -541,7 +541,7 @@ class Writer:
                 yield sent.part.length, _length_text(length_of(sent))
             if isinstance(sent.value, Stream):
                 dropped = f" or {_dropped(answer)}" if _may_be_dropped(answer) else ""
-                yield from _passed(sent.value.part, sent.part, dropped)
+                yield from _passed(sent.value.part, sent.part, dropped, has_others=len(self.program.inputs) > 1)
             elif sent.value is None:
                 yield from _empty(_ports_of(sent.part))
             elif isinstance(sent.value, Listed):
@@ -659,7 +659,7 @@ class Writer:
             return f"{flow} and at_step_r({self.bases[phase]}) and not {all_}"
         return f"advance and at_step_r({self.bases[phase + 1] - 1})"
 
-    def _input(self, part: Part | Elements) -> Context:
+    def _input(self, side: Side, part: Part | Elements) -> Context:
         loop = next((item for item in self.program.loops if item.number == part.number), None)
         passed = any(
             isinstance(sent.value, Stream) and sent.value.number == part.number
@@ -672,7 +672,9 @@ class Writer:
             accepted = [name for name in accepted if isinstance(part, Elements) and name != ready]
         numbers = None
         if loop and isinstance(part, Part):
-            numbers = {"element": part.element, "stream": part.stream, "bits": part.bits}
+            # A part of an element is kept until the other messages are there, and dropped if its own one is withdrawn.
+            is_open = f"{side.prefix}segment_valid(0)"
+            numbers = {"element": part.element, "stream": part.stream, "bits": part.bits, "open": is_open}
         return {
             "ready": ready,
             "accepted": accepted,
@@ -735,10 +737,14 @@ def _own_signal(name: str, answer: Answer) -> str:
     return f"{name}_{answer.side.prefix.strip('_')}"
 
 
-def _passed(source: Part | Elements, part: Part | Elements, dropped: str) -> Iterator[tuple[str, str]]:
-    """Yield the connections of a part that is passed on."""
+def _passed(
+    source: Part | Elements, part: Part | Elements, dropped: str, *, has_others: bool
+) -> Iterator[tuple[str, str]]:
+    """Yield the connections of a part that is passed on; it waits until the other messages are there, if any."""
     for taken, given in zip(_ports_of(source), _ports_of(part), strict=True):
-        yield (taken.name, f"{given.name}{dropped}") if taken.is_reverse else (given.name, taken.name)
+        to, text = (taken.name, f"{given.name}{dropped}") if taken.is_reverse else (given.name, taken.name)
+        is_level = taken.width is None and to.endswith(("valid", "ready"))
+        yield to, f"({text}) and is_open" if has_others and is_level else text
 
 
 def _empty(ports: Iterable[MessagePort]) -> Iterator[tuple[str, str]]:

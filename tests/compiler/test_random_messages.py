@@ -22,12 +22,7 @@ from tests.seeds import seeded
 from tools.bench.kernels import KERNELS
 
 SEED = seeded(20261203)
-# The elements of some messages of joint_pid are wrong, and its publisher reports an error: not explained yet.
-_UNEXPLAINED = pytest.mark.xfail(reason="elements of joint_pid are wrong after some messages")
-SPECS = [
-    pytest.param(spec, id=spec.stem, marks=[_UNEXPLAINED] if spec.stem == "joint_pid" else [])
-    for spec in sorted({kernel.spec for kernel in KERNELS})
-]
+SPECS = [pytest.param(spec, id=spec.stem) for spec in sorted({kernel.spec for kernel in KERNELS})]
 # Of arrays: the buffer of an answer has 64 bytes.
 _LONGEST = 5
 _ANY = 1 << 16
