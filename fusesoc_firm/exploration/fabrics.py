@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ class Fabric:
 
     `lut` and `ff` are estimated for an ECP5. `cycles` are those from the message with the most bits at a publisher to
     the same message at a reader, if nothing else is under way, and `interval` those between two such messages. A way
-    that is not possible has a `fault`. `beats` has those of a frame of each flow.
+    that is not possible has a `fault`.
     """
 
     name: str
@@ -37,7 +37,6 @@ class Fabric:
     cycles: int = 0
     interval: int = 1
     fault: str = ""
-    beats: tuple[int, ...] = ()
 
     @property
     def network(self) -> Network | None:
@@ -91,10 +90,9 @@ def _exchanged(name: str, system: DerivedSystem, exchange: Exchange) -> Fabric:
     sent = [topics[end.source.block] for end in exchange.ends if end.source]
     taken = [topics[end.sink.block] for end in exchange.ends if end.sink]
     lut = sum(sender_lut(_bits(item)) for item in sent) + routers_lut(network, width)
-    beats = tuple(_beats(exchange, topics, width))
     times = [
         (1 + delay(network, flow, sink) + count, count * len(network.flows_of(flow.source)))
-        for flow, count in zip(network.flows, beats, strict=True)
+        for flow, count in zip(network.flows, _beats(network), strict=True)
         for sink in flow.sinks
     ]
     return Fabric(
@@ -105,16 +103,12 @@ def _exchanged(name: str, system: DerivedSystem, exchange: Exchange) -> Fabric:
         # A message is one cycle in the register of its publisher.
         cycles=max(cycles for cycles, _ in times),
         interval=max(interval for _, interval in times),
-        beats=beats,
     )
 
 
-def _beats(exchange: Exchange, topics: dict[str, Junction], width: int) -> Iterator[int]:
-    """Yield the beats of a frame of each flow."""
-    for flow in exchange.network.flows:
-        source = exchange.ends[flow.source].source
-        assert source is not None
-        yield -(-_bits(topics[source.block]) // width)
+def _beats(network: Network) -> list[int]:
+    """Return the beats of a message of each flow, which are its rate in an exchange."""
+    return [round(flow.rate) for flow in network.flows]
 
 
 def _bits(junction: Junction) -> int:
@@ -139,15 +133,15 @@ def traffic(fabric: Fabric) -> Traffic:
     network = fabric.network
     assert network is not None
     sources = sorted({flow.source for flow in network.flows})
-    always = [_Sent(0, source) for source in sources for _ in range(_CYCLES // min(fabric.beats) + 1)]
-    ends = _received(network, fabric.beats, always)
+    always = [_Sent(0, source) for source in sources for _ in range(_CYCLES // min(_beats(network)) + 1)]
+    ends = _received(network, always)
     counts = dict.fromkeys(sources, 0)
     for number, end in ends.items():
         counts[always[number].source] += end >= _WARM
     rate = min(counts.values()) / (_CYCLES - _WARM)
     random = Random(_SEED)
     some = [_Sent(cycle, source) for cycle in range(_CYCLES) for source in sources if random.random() < rate / 2]
-    ends = _received(network, fabric.beats, some)
+    ends = _received(network, some)
     # The first cycle of a message is that in the register of its publisher, the last one that at its reader.
     waits = [end + 2 - some[number].cycle for number, end in ends.items()]
     return Traffic(1000 * rate, sum(waits) / len(waits) if waits else 0.0, max(waits, default=0))
@@ -160,18 +154,16 @@ class _Sent(NamedTuple):
     source: int
 
 
-def _received(network: Network, beats: Sequence[int], sent: Sequence[_Sent]) -> dict[int, int]:
+def _received(network: Network, sent: Sequence[_Sent]) -> dict[int, int]:
     """Return the cycle of the last beat at the last reader of each message that all of its readers receive.
 
     Without routers that copy, a message is a frame to each of its readers.
     """
     frames: list[tuple[Frame, int]] = []
     sinks = dict.fromkeys({flow.source for flow in network.flows}, 0)
-    for place, flow in enumerate(network.flows):
+    for place, (flow, beats) in enumerate(zip(network.flows, _beats(network), strict=True)):
         sinks[flow.source] += len(flow.sinks)
-        frames += [
-            (Frame(item.cycle, place, beats[place]), n) for n, item in enumerate(sent) if item.source == flow.source
-        ]
+        frames += [(Frame(item.cycle, place, beats), n) for n, item in enumerate(sent) if item.source == flow.source]
     frames.sort(key=lambda pair: (pair[0].cycle, pair[1]))
     found: dict[int, list[int]] = {}
     for arrival in arrivals(network, [frame for frame, _ in frames], _CYCLES):
