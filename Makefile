@@ -24,7 +24,7 @@ PYTHONS ?=
 # Programs that a target needs in addition to the common ones.
 TOOLS :=
 # Edalize's flows that end in a bitstream; the PyPI packages of each open one are an extra of the same name.
-OPEN_FLOWS := apicula icestorm trellis
+OPEN_FLOWS := apicula gatemate icestorm machxo2 nexus trellis
 BITSTREAM_FLOWS := $(OPEN_FLOWS) quartus vivado
 # The folder of message definitions for `make corpus`, with folders ros1 and ros2, and further options of its command.
 CORPUS ?=
@@ -143,7 +143,7 @@ bench: setup ros studio $(VENV)/.extra-bench ## Measure area, cycles, robustness
 	@$(BIN)/python -m tools.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
-bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
+bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (ulx3s, icebreaker, tangnano9k, ...) to a bitstream
 	@flow=$$($(BIN)/python .ci/check_target.py $(SYSTEM) $(BOARD) $(BITSTREAM_FLOWS)); \
 	case " $(OPEN_FLOWS) " in \
 	  *" $$flow "*) ./.ci/install-tools yosys >/dev/null; $(MAKE) --no-print-directory $(VENV)/.extra-$$flow ;; \

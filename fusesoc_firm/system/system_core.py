@@ -32,7 +32,6 @@ from fusesoc_firm.system.boards.block_design import (
 )
 from fusesoc_firm.system.boards.board import (
     BOARD_TEMPLATE,
-    FLOWS,
     VIVADO,
     Board,
     board_configuration,
@@ -87,6 +86,7 @@ from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import render
 from fusesoc_firm.text.yaml_text import Text
 from fusesoc_firm.tools.flows import Flow
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from fusesoc_firm.tools.reads import Input
 
 # FuseSoC's file types of Verilog by suffix, and the suffixes of files that are not compiled separately.
@@ -345,13 +345,15 @@ def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]
 
 def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
     configuration = board_configuration(loaded.system, board)
-    form, file_type = FLOWS[board.flow]
+    flow = OPEN_FLOWS[board.flow]
     files = {}
     if pll := configuration["pll"]:
         files[f"{pll['entity']}.v"] = GeneratedFile(render(PLL_TEMPLATES[board.flow], pll), _FILE_TYPES[".v"])
     return files | {
         f"{configuration['entity']}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
-        f"{board.name}.{form}": GeneratedFile(render(f"board/{form}", configuration), file_type),
+        f"{board.name}.{flow.constraints}": GeneratedFile(
+            render(f"board/{flow.constraints}", configuration), flow.file_type
+        ),
     }
 
 

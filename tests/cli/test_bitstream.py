@@ -189,8 +189,8 @@ def test_a_bitstream_is_loaded(capsys: Captured, tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
-        (["bitstream"], "which board?\n      = add --board NAME; boards of tilt.core: icebreaker, "),
-        (["load"], "which board?\n      = add --board NAME; boards of tilt.core: icebreaker, "),
+        (["bitstream"], "which board?\n      = add --board NAME; boards of tilt.core: crosslink_nx_evn, "),
+        (["load"], "which board?\n      = add --board NAME; boards of tilt.core: crosslink_nx_evn, "),
         (["bitstream", "--board", "ulx3"], "tilt.core has no board 'ulx3'\n      = did you mean 'ulx3s'? boards of"),
         (
             ["load", "--board", "ulx3s_w5500"],

@@ -28,6 +28,7 @@ from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, Request, as_
 from fusesoc_firm.node.transport.built_simulator import _build_folder
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 
 CANARY = "hostile_canary"
 # Printable, therefore legal; each has a special meaning in some language.
@@ -272,19 +273,23 @@ def test_constraints_of_quartus(project: Project, tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(("flow", "mark"), [("trellis", "#"), ("icestorm", "#"), ("apicula", "//")])
-def test_constraints_of_pins(project: Project, flow: str, mark: str) -> None:
+@pytest.mark.parametrize("flow", OPEN_FLOWS)
+def test_constraints_of_pins(project: Project, flow: str) -> None:
     """These formats have no stand-alone reader: check comment lines, and allow only words of the board file."""
     pins = [
         {"port": port, "site": site} for port, site in (("clk", "A1"), ("uart_rxd", "IOB 2/3"), ("uart_txd", "10,11"))
     ]
     board = {"description": DESCRIPTION, "flow": flow, "clock": "25 MHz", "interconnect": "uart", "pins": pins}
+    board["device"] = "GW1N"
     (project.folder / f"{flow}.yaml").write_text(json.dumps(board), encoding="utf-8")
     files = project.generated(spec=project.ros_2.name, board=f"{flow}.yaml")
-    form = {"trellis": "lpf", "icestorm": "pcf", "apicula": "cst"}[flow]
+    form = OPEN_FLOWS[flow].constraints
+    mark = "//" if form == "cst" else "#"
     comment, *rest = files[f"{flow}.{form}"].decode("ascii").split("\n")
     assert comment.startswith(f"{mark} f\\xfcr [exec touch hostile_canary] $(x) `y`")
-    assert rest and all(re.fullmatch(r'[A-Za-z_]*( "?[A-Za-z0-9_ /,.]+"?)*;?', line) for line in rest), rest
+    rest = [line for line in rest if not line.startswith(mark)]
+    word = r'("?[A-Za-z0-9_ /,.=]+"?|\{[A-Za-z0-9_ /,.=]+\}|\[get_ports \{[a-z_]+\}\]|-[a-z]+)'
+    assert rest and all(re.fullmatch(rf"[A-Za-z_]*( {word})*;?", line) for line in rest), rest
 
 
 @pytest.mark.parametrize("which", ["ros_1", "ros_2"])

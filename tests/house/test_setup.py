@@ -15,6 +15,7 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from fusesoc_firm.tools.programs import PROGRAMS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -390,10 +391,9 @@ def test_what_is_unknown_is_refused_before_anything_is_installed(
 def test_each_family_of_boards_has_an_extra_that_can_be_installed() -> None:
     boards = [yaml.safe_load(path.read_text(encoding="utf-8")) for path in ROOT.glob("fusesoc_firm/boards/*.yaml")]
     extras = {name: {Requirement(item).name for item in items} for name, items in extras_of_project().items()}
-    programs = {"apicula": "nextpnr-himbaechel", "icestorm": "nextpnr-ice40", "trellis": "nextpnr-ecp5"}
-    assert {board["flow"] for board in boards} - {"quartus", "vivado"} == programs.keys()
-    for flow, program in programs.items():
-        assert extras[flow] == {PROGRAMS[program].pypi}
+    assert {board["flow"] for board in boards} - {"quartus", "vivado"} == OPEN_FLOWS.keys()
+    for name, flow in OPEN_FLOWS.items():
+        assert extras[name] == {PROGRAMS[program].pypi for program in (flow.synthesis, flow.layout)} - {""}
     # nextpnr for Gowin requires a certain version of it; a limit of ours could only conflict.
     assert not any("apycula" in name.lower() for names in extras.values() for name in names)
 

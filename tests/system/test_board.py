@@ -16,7 +16,6 @@ from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.system.boards.board import (
     BOARD_TEMPLATE,
-    FLOWS,
     Board,
     board_configuration,
     boards,
@@ -30,6 +29,7 @@ from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import LINKS, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.render import TEMPLATES, render
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 SPECIFICATION = """
@@ -95,7 +95,7 @@ def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
     assert system.link.kind.value == board.interconnect
     configuration = board_configuration(system, board)
     assert f"entity robot_{name} is" in render(BOARD_TEMPLATE, configuration)
-    form, _ = FLOWS[board.flow]
+    form = OPEN_FLOWS[board.flow].constraints
     constraints = render(f"board/{form}", configuration)
     for pin in board.pins:
         assert pin.port in constraints
@@ -180,8 +180,8 @@ def test_times_are_those_of_the_boards_clock(tmp_path: Path) -> None:
 
 def test_constraints_of_each_form(tmp_path: Path) -> None:
     texts = {}
-    for flow, (form, _) in FLOWS.items():
-        board = written(tmp_path, BOARD.replace("trellis", flow) + "standard: LVCMOS33\n")
+    for flow, form in ((name, flow.constraints) for name, flow in OPEN_FLOWS.items()):
+        board = written(tmp_path, BOARD.replace("trellis", flow) + "standard: LVCMOS33\ndevice: X1\n")
         configuration = board_configuration(on(tmp_path, board, "fixed_priority"), board)
         texts[form] = render(f"board/{form}", configuration).splitlines()
     assert 'FREQUENCY PORT "clk" 25 MHZ;' in texts["lpf"]
@@ -190,6 +190,9 @@ def test_constraints_of_each_form(tmp_path: Path) -> None:
     assert "set_io clk A1" in texts["pcf"]
     assert "set_frequency clk 25" in texts["pcf"]
     assert 'IO_LOC "clk" A1;' in texts["cst"]
+    assert "ldc_set_location -site {A1} [get_ports {clk}]" in texts["pdc"]
+    assert "ldc_set_port -iobuf {IO_TYPE=LVCMOS33} [get_ports {clk}]" in texts["pdc"]
+    assert 'Net "clk" Loc = "A1";' in texts["ccf"]
     assert 'IO_PORT "clk" IO_TYPE=LVCMOS33;' in texts["cst"]
 
 
@@ -278,14 +281,14 @@ def test_a_board_has_one_clock(tmp_path: Path) -> None:
 PINS = "{name: Lamp, direction: out}, {name: level, direction: in, bits: 2}"
 
 
-@pytest.mark.parametrize("flow", FLOWS)
+@pytest.mark.parametrize("flow", OPEN_FLOWS)
 def test_pins_of_accelerators_lead_to_sites(tmp_path: Path, flow: str) -> None:
     """In the case that a netlist has, whatever the specification and the board say."""
     places = {"BLOCK_lamp": "B1", "block_level[0]": "B2", "block_level[1]": "B3"}
     text = BOARD.replace("trellis", flow) + "".join(
         f"  - {{port: '{name}', site: {places[name]}}}\n" for name in places
     )
-    board = written(tmp_path, text)
+    board = written(tmp_path, f"{text}device: X1\n")
     system = with_pins(tmp_path, board, PINS)
     check_fits(system, board)
     configuration = board_configuration(system, board)
@@ -293,10 +296,10 @@ def test_pins_of_accelerators_lead_to_sites(tmp_path: Path, flow: str) -> None:
     assert "block_lamp : out std_logic;" in top
     assert "block_level : in std_logic_vector(1 downto 0)" in top
     assert {"block_lamp => block_lamp,", "block_level => block_level,"} <= set(top)
-    lines = render(f"board/{FLOWS[flow][0]}", configuration).splitlines()
+    lines = render(f"board/{OPEN_FLOWS[flow].constraints}", configuration).splitlines()
     for name, site in places.items():
         (line,) = (line for line in lines if site in line)
-        assert name.lower() in line.replace('"', "")
+        assert name.lower() in re.sub('["{}]', "", line)
 
 
 def test_pins_without_a_place_and_places_without_a_pin(tmp_path: Path) -> None:

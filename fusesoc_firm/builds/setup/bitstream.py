@@ -17,13 +17,12 @@ from fusesoc_firm.core.core_reader import read_core
 from fusesoc_firm.system.boards.board import Board, boards
 from fusesoc_firm.system.scaffold.board_targets import boards_of
 from fusesoc_firm.text.diagnostics import closest, fail
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS, REPORT
 from fusesoc_firm.tools.programs import missing, ways
 
 CHECK = "check"
 _SETUP = "generated files"
-_NETLIST = {"ghdl": "netlist", "yosys": "synthesis"}
-_LAYOUT, _PACKING = "place and route", "bitstream"
-_REPORT = "report.json"
+_STEPS = ("netlist", "synthesis", "place and route", "bitstream")
 # The line with which a makefile starts a program of a build; Python is the netlist's program.
 _START = re.compile(r"-m fusesoc_firm\.cli tool (?:\S*/)?(?P<program>\S+)(?P<netlist> -m fusesoc_firm\.netlist )?")
 
@@ -37,11 +36,9 @@ class _Flow:
 
 
 _FLOWS = {
-    "apicula": _Flow(".fs", {**_NETLIST, "nextpnr-himbaechel": _LAYOUT, "gowin_pack": _PACKING}),
-    "icestorm": _Flow(".bin", {**_NETLIST, "nextpnr-ice40": _LAYOUT, "icepack": _PACKING}),
-    "trellis": _Flow(".bit", {**_NETLIST, "nextpnr-ecp5": _LAYOUT, "ecppack": _PACKING}),
-    "vivado": _Flow(".bit", {"vivado": _PACKING}),
-}
+    name: _Flow(flow.bitstream, dict(zip(("ghdl", *flow.programs), _STEPS, strict=True)))
+    for name, flow in OPEN_FLOWS.items()
+} | {"vivado": _Flow(".bit", {"vivado": _STEPS[-1]})}
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,9 @@ class Figures:
     def lines(self) -> list[str]:
         """Return the figures as lines of a report."""
         found = [f"clock:     {item.reached:.1f} MHz reached, {item.needed:.1f} MHz needed" for item in self.clocks]
-        area = ", ".join(f"{item.name} {item.used} of {item.available}" for item in self.area)
+        # nextpnr counts some cells of a GateMate only in use.
+        counts = {item: f" of {item.available}" if item.available else "" for item in self.area}
+        area = ", ".join(f"{item.name} {item.used}{available}" for item, available in counts.items())
         return found + [f"area:      {area}"] * bool(area)
 
     def data(self) -> dict[str, Any]:
@@ -148,7 +147,7 @@ class BoardBuild:
 
     def figures(self) -> Figures:
         """Return what nextpnr reports about the clocks and the area."""
-        path = self.build.work_root / _REPORT
+        path = self.build.work_root / REPORT
         if not path.is_file():
             return Figures()
         report = json.loads(path.read_text(encoding="utf-8"))

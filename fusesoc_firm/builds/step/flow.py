@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.builds.step.clock_check import checked
 from fusesoc_firm.text.diagnostics import nearest
 from fusesoc_firm.tools.flows import FAMILIES, FIRM, NETLIST, SUFFIX, Flow, family_flow, read_flow, simulator_flow
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from fusesoc_firm.tools.simulators import SIMULATORS
 
 # Edalize's flows for boards.
-_BOARD_FLOWS = tuple(Flow(name, {"frontends": [NETLIST]}) for name in ("apicula", "icestorm", "trellis", "vivado"))
+_BOARD_FLOWS = tuple(Flow(name, {"frontends": [NETLIST]}) for name in (*OPEN_FLOWS, "vivado"))
+# The clocks of a build in its description, which Edalize does not read.
+_CLOCKS = "firm_clocks"
 
 
 def resolved(api: str, name: str, edam: dict[str, Any], work_root: str) -> tuple[str, str, dict[str, Any]]:
@@ -32,7 +37,7 @@ def resolved(api: str, name: str, edam: dict[str, Any], work_root: str) -> tuple
     if unknown := [option for option in given if option not in options_of(flow)]:
         place = f"{flow.name} with {flow.tool}" if flow.tool != flow.name and flow.tool else flow.name
         raise RuntimeError(f"the flow {place} has no option '{unknown[0]}'; {nearest(unknown[0], options_of(flow))}")
-    others = {key: value for key, value in edam.items() if key != "flow_options"}
+    others = {key: value for key, value in edam.items() if key != "flow_options"} | {_CLOCKS: flow.clocks}
     return (
         flow.api,
         flow.name,
@@ -60,7 +65,10 @@ def _of_family(name: str, edam: dict[str, Any]) -> Flow:
 
 def backend(api: str, name: str, edam: dict[str, Any], work_root: str, *, is_verbose: bool = False) -> Any:
     """Return Edalize's object for a build. May raise `RuntimeError`."""
-    return _class(api, name)(edam=edam, work_root=work_root, verbose=is_verbose)
+    made = _class(api, name)
+    if clocks := edam.get(_CLOCKS):
+        made = checked(made, name, clocks)
+    return made(edam=edam, work_root=work_root, verbose=is_verbose)
 
 
 def options_of(flow: Flow) -> dict[str, Any]:
@@ -86,7 +94,9 @@ def _flows() -> Iterator[Flow]:
 
 def _class(api: str, name: str) -> Any:
     if api == "flow":
-        return getattr(import_module(f"edalize.flows.{name}"), name.capitalize())
+        found = getattr(import_module(f"edalize.flows.{name}"), name.capitalize())
+        # Edalize 0.6.8 merges the options of a build into its flow's table, where the next build would find them.
+        return type(found.__name__, (found,), {"_flow": deepcopy(getattr(found, "_flow", {}))})
     from edalize.edatool import get_edatool
 
     return get_edatool(name)

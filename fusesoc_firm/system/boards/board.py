@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -35,18 +36,21 @@ from fusesoc_firm.text.naming import identifier, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 from fusesoc_firm.tools.flows import NETLIST, Flow
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS, REPORT
 
 FOLDER = Path(__file__).resolve().parents[2] / "boards"
 BOARD_TEMPLATE = "vhdl/board.vhd"
 
-# Edalize's flows for boards with pins, each with the template and FuseSoC file type of the constraints.
-FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
 # The flag that selects the cells for pins with both edges (robot:net:firm_ddr) by flow.
 _DDR_FLAGS = {"trellis": "ddr_ecp5"}
 # Tools for systems whose streams are ports: Vivado places the system next to a processor, Quartus uses it unchanged.
 VIVADO, QUARTUS = "vivado", "quartus"
-# The keys of a board that each tool requires.
-_NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
+# The keys of a board that each flow requires.
+_NEEDED = {
+    **{name: ("device",) * flow.needs_device for name, flow in OPEN_FLOWS.items()},
+    VIVADO: ("part", "processor"),
+    QUARTUS: ("device", "deviceFamily"),
+}
 _CLOCK, _OSCILLATOR = "clk", "oscillator"
 _PHY_RESET = "phy_rst_n"
 _PORTS = (
@@ -98,7 +102,7 @@ class Board(Section):
     """The contents of a board file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
-    flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
+    flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=tuple(_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
     oscillator: Text | None = key("frequency of the pin oscillator, if a PLL makes clk of it")
     interconnect: Text = key(
@@ -124,7 +128,7 @@ class Board(Section):
     @property
     def is_linked(self) -> bool:
         """Whether pins connect the host or the network to the system."""
-        return self.flow in FLOWS
+        return self.flow in OPEN_FLOWS
 
     @property
     def edalize_flow(self) -> Flow:
@@ -136,12 +140,29 @@ class Board(Section):
             # Only if Vivado manages the sources can a block design refer to modules by name.
             "source_mgmt_mode": "All" if self.flow == VIVADO else None,
             "yosys_synth_options": self.synth_options,
-            "nextpnr_options": self.nextpnr_options,
+            "nextpnr_options": self._nextpnr_options(),
             "device": self.device,
             "family" if self.flow == QUARTUS else "device_family": self.device_family,
         }
         plain = {name: _plain(value) for name, value in options.items() if value}
-        return Flow(str(self.flow), plain, is_tool=self.flow == QUARTUS)
+        return Flow(str(self.flow), plain, is_tool=self.flow == QUARTUS, clocks=self._clocks())
+
+    def _nextpnr_options(self) -> Sequence[str]:
+        """The options of nextpnr: the board's, the report and, if the constraints cannot state it, the clock."""
+        if not self.is_linked:
+            return ()
+        needed = {"--report": REPORT}
+        if not OPEN_FLOWS[self.flow].is_clocked:
+            needed["--freq"] = self._clocks()[_CLOCK]
+        added = [item for item in needed.items() if item[0] not in self.nextpnr_options]
+        return [*self.nextpnr_options, *chain.from_iterable(added)]
+
+    def _clocks(self) -> Mapping[str, str]:
+        """The clocks of the system in MHz: clk, and those of the PHY. Without pins, other constraints state them."""
+        clock = clock_of(self) if self.is_linked else None
+        if clock is None:
+            return {}
+        return {_CLOCK: megahertz(clock), **{name: str(mhz) for name, mhz in _line_clocks(self).items()}}
 
     @property
     def clock_port(self) -> str:
@@ -205,6 +226,7 @@ def read_board(name: str, folder: Path = Path()) -> Board:
         fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock' and 'interconnect'")
     board = read(Board, text.root, text, faults, "a board")
     if board.is_sound:
+        _check_keys(board, faults)
         _pll(board, faults)
     if board.is_sound and board.is_linked:
         _check_pins(board, faults)
@@ -274,7 +296,8 @@ def _check_ports(board: Board, pins: Mapping[str, Text], faults: Diagnostics) ->
         )
 
 
-def _check_streams(board: Board, faults: Diagnostics) -> None:
+def _check_keys(board: Board, faults: Diagnostics) -> None:
+    """Note the keys that the board's flow needs and that are missing."""
     given = {
         "part": board.part,
         "processor": board.processor,
@@ -284,6 +307,9 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
     for name in _NEEDED[board.flow]:
         if given[name] is None:
             faults.error(f"a board with flow '{board.flow}' needs the key '{name}'", board.source)
+
+
+def _check_streams(board: Board, faults: Diagnostics) -> None:
     if board.interconnect != AXI_STREAM:
         faults.error(
             f"flow '{board.flow}' supports only streams", board.interconnect.source, f"legal here: {AXI_STREAM}"

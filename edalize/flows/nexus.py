@@ -1,0 +1,12 @@
+"""Edalize's flow `nexus`: a bitstream for FPGAs of the family Lattice Nexus, by open tools.
+
+Edalize finds a flow by its file's name, and its packages are namespace packages, so this one can be in another wheel.
+"""
+
+from __future__ import annotations
+
+from fusesoc_firm.builds.step.open_flow import BitstreamFlow
+
+
+class Nexus(BitstreamFlow):
+    """Synthesis by Yosys, layout by nextpnr, and the bitstream by the family's packer."""
