@@ -40,6 +40,10 @@ class Listed:
     length: Node
     elements: list[dict[str, list[Node]]]
 
+    def nodes(self) -> Iterator[Node]:
+        """Yield the numbers of all elements."""
+        yield from chain(*(chain(*fields.values()) for fields in self.elements))
+
 
 @dataclass
 class Sent:
@@ -50,8 +54,7 @@ class Sent:
 
     def listed(self) -> list[Node]:
         """Return the numbers of all elements that are listed."""
-        elements = self.value.elements if isinstance(self.value, Listed) else []
-        return [node for fields in elements for nodes in fields.values() for node in nodes]
+        return [*self.value.nodes()] if isinstance(self.value, Listed) else []
 
 
 @dataclass
@@ -62,6 +65,11 @@ class Answer:
     condition: Node
     fields: dict[str, list[Node]] = field(default_factory=dict)
     parts: list[Sent] = field(default_factory=list)
+
+    @property
+    def is_conditional(self) -> bool:
+        """Whether the answer is not always sent."""
+        return not self.condition.is_constant or not self.condition.payload
 
     def nodes(self) -> Iterator[Node]:
         """Yield all values that the answer needs, except for those that loops make."""
@@ -191,13 +199,13 @@ class AnswerMaker:
         name = dotted(names_of(part.path))
         if not condition.is_constant and given is not None:
             self._refuse(f"'{name}' is only in some answers", "send it always, or return None")
-        is_fixed = _count(part) is not None
+        is_fixed = part.count is not None
         match given:
             case Stream() if given.part is not None and given.part.shape == part.shape:
                 return Sent(part, given)
             case Produced(loop=number, element=element):
                 loop = next(item for item in self.interpreter.loops if item.number == number)
-                if not is_fixed or _count(loop.stream.part) == _count(part):
+                if not is_fixed or loop.stream.part.count == part.count:
                     return Sent(part, Made(loop, self._element(side, part, element)))
             case None | "" if not is_fixed:
                 return Sent(part, None)
@@ -231,9 +239,10 @@ class AnswerMaker:
 
     def _check_count(self, part: Part | Elements, count: int) -> None:
         """Refuse a number of elements that the message does not have."""
-        fixed, name = _count(part), dotted(names_of(part.path))
-        if fixed is not None and count != fixed:
-            self._refuse(f"'{name}' has {fixed} elements, and the list has {count}", f"return a list of {fixed}")
+        name = dotted(names_of(part.path))
+        if part.count not in (None, count):
+            hint = f"return a list of {part.count}"
+            self._refuse(f"'{name}' has {part.count} elements, and the list has {count}", hint)
         if part.bound is not None and count > part.bound:
             self._refuse(f"'{name}' has at most {part.bound} elements, and the answer has {count}", "return fewer")
 
@@ -269,7 +278,3 @@ def _leaves(side: Side) -> Iterator[Any]:
     for node in all_nodes(side.frame.nodes):
         if isinstance(node, Fixed):
             yield from node.fields
-
-
-def _count(part: Part | Elements) -> int | None:
-    return part.count if isinstance(part, Elements) else None

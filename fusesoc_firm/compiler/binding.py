@@ -131,13 +131,13 @@ def uses(schedule: Schedule) -> Iterator[Use]:
         step = schedule.issues[node.number].start if is_operator(node) else time.step
         yield from (Use(item, time.phase, step) for item in node.operands)
     for loop in program.loops:
-        phase = 2 * loop.number + 1
+        phase = loop.phase
         for item in loop.carried.values():
             yield Use(item.first, phase - 1, schedule.steps[phase - 1] - 1)
             if item.next is not None:
                 yield Use(item.next, phase, schedule.carried.get(item.value.number, schedule.steps[phase] - 1))
     for made in program.made():
-        phase = 2 * made.loop.number + 1
+        phase = made.loop.phase
         yield from (Use(node, phase, schedule.end(phase)) for node in chain(*made.fields.values()))
     yield from (Use(state.next, end, 0) for state in program.states)
     for answer in program.answers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from fusesoc_firm.compiler.conversions import converted
 from fusesoc_firm.compiler.graph import Graph, Node
@@ -64,8 +64,9 @@ class Leaf:
 class Part:
     """A string or an array of variable size: its place in the message, and the prefix of its stream's ports.
 
-    `length` is the port with the number of elements. `number` counts the parts of the message in wire order; the part
-    follows the segment of its length. The elements have no kind if they are characters, and are at most `bound`.
+    `length` is the port with the number of elements, which is never fixed. `number` counts the parts of the message in
+    wire order; the part follows the segment of its length. The elements have no kind if they are characters, and are at
+    most `bound`.
     """
 
     path: Path
@@ -76,6 +77,7 @@ class Part:
     segment: int
     number: int
     bound: int | None = None
+    count: ClassVar[None] = None
 
     @property
     def element(self) -> str:
@@ -89,6 +91,13 @@ class Part:
     def shape(self) -> tuple[object, ...]:
         """What two strings or arrays have in common if one can be passed on as the other."""
         return (self.kind, self.bits)
+
+    @property
+    def ports(self) -> tuple[MessagePort, ...]:
+        """The ports, except for the length."""
+        forward = {"tdata": 8, "tkeep": 1, "tvalid": None, "tlast": None}
+        ports = [MessagePort(f"{self.stream}_{signal}", width) for signal, width in forward.items()]
+        return (*ports, MessagePort(f"{self.stream}_tready", None, is_reverse=True))
 
 
 @dataclass(frozen=True)
@@ -203,16 +212,17 @@ def message_value(side: Side, graph: Graph, memory: Memory, numbers: Kind | None
     """Return a message as the function receives it; floats have the kind `numbers`, if it is given."""
     tree = _fields(graph, side.leaves, numbers)
     for part in side.parts:
-        phase = 2 * part.segment
-        length = graph.constant(part.count) if isinstance(part, Elements) and part.count is not None else None
-        if length is None:
-            limits = 0, _MOST_ELEMENTS
-            # The limits need a bit less than the port has.
-            length = graph.leaf("input", INT, Bits(str(part.length), limits[1].bit_length() - 1), limits, phase)
+        length = graph.constant(part.count) if part.count is not None else _length(graph, part)
         name = dotted(names_of(part.path))
         _set(tree, names_of(part.path), Stream(part, name, part.number, length, _maker(graph, part, numbers)))
     message: Record = _objects(tree, memory)
     return message
+
+
+def _length(graph: Graph, part: Part | Elements) -> Node:
+    # The limits need a bit less than the port has.
+    bits = Bits(str(part.length), _MOST_ELEMENTS.bit_length() - 1)
+    return graph.leaf("input", INT, bits, (0, _MOST_ELEMENTS), 2 * part.segment)
 
 
 def _fields(graph: Graph, leaves: Sequence[Leaf], numbers: Kind | None, phase: int | None = None) -> dict[Any, Any]:

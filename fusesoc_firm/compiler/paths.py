@@ -56,11 +56,20 @@ class Carried:
 class Loop:
     """A loop over a stream, at a node of the source: the carried values, and the lists to which it appends."""
 
-    number: int
     stream: Stream
     node: ast.AST
     carried: dict[Any, Carried] = field(default_factory=dict)
     appended: dict[Array, Value] = field(default_factory=dict)
+
+    @property
+    def number(self) -> int:
+        """The number of the stream in its message."""
+        return self.stream.number
+
+    @property
+    def phase(self) -> int:
+        """The phase of the computations for an element."""
+        return self.stream.phase
 
 
 @dataclass

@@ -76,22 +76,18 @@ class Program:
         used = {id(item) for loop in self.loops for item in loop.carried.values()}
         while True:
             read = self._reached([*self.results()])
-            kept = {
-                id(item) for loop in self.loops for item in loop.carried.values() if self._is_read(loop, item, read)
-            }
+            kept = {id(item) for loop in self.loops for item in loop.carried.values() if self._is_read(item, read)}
             if kept == used:
                 return
             used = kept
             for loop in self.loops:
                 loop.carried = {key: item for key, item in loop.carried.items() if id(item) in kept}
 
-    def _is_read(self, loop: Loop, item: Carried, read: set[int]) -> bool:
+    def _is_read(self, item: Carried, read: set[int]) -> bool:
         """Whether other values than its own next one depend on a carried value."""
         leaves = {item.value.number}
         leaves |= {
-            node.number
-            for node in self.graph.nodes
-            if node.operation == "final" and node.payload == (loop.number, item.value.payload)
+            node.number for node in self.graph.nodes if node.operation == "final" and node.payload == item.value.payload
         }
         others = [node for node in self.results() if node is not item.next]
         return bool(leaves & self._reached(others)) if leaves & read else False

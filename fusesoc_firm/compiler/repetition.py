@@ -141,8 +141,7 @@ class Repetition(Calls):
                 self.assign(node.target, element)
             else:
                 limits = over.first, over.first + (1 << 28)
-                phase = 2 * loop.number + 1
-                index = self.graph.leaf("carried", INT, (loop.number, _INDEX), limits, phase)
+                index = self.graph.leaf("carried", INT, (loop.number, _INDEX), limits, loop.phase)
                 after = self.graph.node("add", (index, self.graph.constant(1)), INT, limits=limits)
                 first = self.graph.constant(over.first)
                 loop.carried[_INDEX] = Carried(f"index_{loop.number}", first, index, after)
@@ -154,7 +153,7 @@ class Repetition(Calls):
     def _element(self, stream: Stream, loop: Loop, node: ast.AST) -> Value:
         if stream.element is None:
             self.refuse(node, f"'{stream.path}' can only be passed on", "loop over an array of numbers or messages")
-        return stream.element(2 * loop.number + 1, self.memory)
+        return stream.element(loop.phase, self.memory)
 
     def stream_loop(self, node: ast.AST, stream: Stream, turn: Callable[[Loop], None]) -> None:
         """Run the body of a loop over a stream, until the kinds of the values that it carries are known."""
@@ -165,7 +164,7 @@ class Repetition(Calls):
         names, memory = dict(self.names), self.memory
         carried: dict[Any, Carried] = {}
         for _ in range(_MOST_ROUNDS):
-            loop = Loop(stream.number, stream, node, dict(carried))
+            loop = Loop(stream, node, dict(carried))
             self.names, self.memory = dict(names), memory.copy()
             self.is_alive = True
             self._enter(carried)
@@ -272,10 +271,7 @@ class Repetition(Calls):
             made = loop.carried[key]
             made.name = f"{made.name}_{loop.number}"
             limits = item.value.low, item.value.high
-            final = self.graph.leaf(
-                "final", item.value.kind, (loop.number, made.value.payload), limits, 2 * loop.number + 2
-            )
-            self._put(key, final)
+            self._put(key, self.graph.leaf("final", item.value.kind, made.value.payload, limits, loop.phase + 1))
         for array, element in loop.appended.items():
             self._keep(element, made_in_loop)
             for key, value in [*self._places(self.names, self.memory)]:

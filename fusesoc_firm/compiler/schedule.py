@@ -131,7 +131,7 @@ class _Builder:
         self.free: dict[Unit, int] = {}
         self.waits: list[int] = []
         self.is_pipeline = False
-        self.loops = {2 * loop.number + 1: loop for loop in schedule.program.loops}
+        self.loops = {loop.phase: loop for loop in schedule.program.loops}
         # Of the phase that is scheduled: the users of each value, the operands that each lacks, and what can start.
         self.phase = 0
         self.users: dict[int, list[Node]] = {}
@@ -151,7 +151,7 @@ class _Builder:
         for operator, count in operators.items():
             if operator.has_wait or count > self.limits.get(operator.operation, 1):
                 return False
-        phase, units = 2 * loop.number + 1, len(self.schedule.units)
+        phase, units = loop.phase, len(self.schedule.units)
         stages = dict.fromkeys((item.value.number for item in loop.carried.values()), 0)
         self.is_pipeline = True
         for _ in range(len(stages) + 2):

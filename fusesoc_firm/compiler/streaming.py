@@ -45,6 +45,11 @@ def is_streamed(answer: Answer) -> bool:
     return any(map(source_of, answer.parts))
 
 
+def may_be_dropped(answer: Answer) -> bool:
+    """Whether an answer is sent while the message is received, or not at all, in which case its parts are accepted."""
+    return is_streamed(answer) and answer.is_conditional
+
+
 def problems(answers: Sequence[Answer], loops: Sequence[Loop], inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:
     """Yield what would wait for ever, or be read twice, each with its remedy."""
     looped = {loop.number for loop in loops}
@@ -72,7 +77,7 @@ def late(loops: Sequence[Loop], answers: Sequence[Answer]) -> Iterator[tuple[Loo
     """Yield each loop that needs a value that follows its array in the message, with the value's name."""
     made = [sent.value for answer in answers for sent in answer.parts if isinstance(sent.value, Made)]
     for loop in loops:
-        phase = 2 * loop.number + 1
+        phase = loop.phase
         needed = [(item.first, phase - 1) for item in loop.carried.values()]
         needed += [(item.next, phase) for item in loop.carried.values() if item.next is not None]
         needed += [(node, phase) for item in made if item.loop is loop for node in chain(*item.fields.values())]
@@ -88,7 +93,7 @@ def _late_name(node: Node, loops: Sequence[Loop]) -> str:
         node = max(node.operands, key=lambda item: item.phase)
     if node.operation == "final":
         carried = chain(*(loop.carried.values() for loop in loops))
-        return next(item.name.rpartition("_")[0] for item in carried if item.value.payload == node.payload[1])
+        return next(item.name.rpartition("_")[0] for item in carried if item.value.payload == node.payload)
     return re.sub(r"^in\d*_", "", node.payload.port)
 
 
@@ -126,7 +131,7 @@ def _waits(answer: Answer) -> Iterator[tuple[str, str]]:
 
 def _after(source: Stream) -> int:
     """Return the phase of values that follow from the elements of an array."""
-    return 2 * source.number + 2
+    return source.phase + 1
 
 
 def _needs(answer: Answer) -> Iterator[tuple[str, int, Node, str]]:

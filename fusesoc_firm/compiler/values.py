@@ -64,6 +64,11 @@ class Stream:
     length: Node
     element: Callable[[int, Memory], Any] | None
 
+    @property
+    def phase(self) -> int:
+        """The phase in which the elements pass."""
+        return 2 * self.number + 1
+
 
 @dataclass(frozen=True)
 class Produced:

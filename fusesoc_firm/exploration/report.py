@@ -103,13 +103,13 @@ class Report:
     @property
     def elements(self) -> Mapping[str, int]:
         """The cycles for each element of the arrays over which the function loops."""
-        return {loop.stream.path: self.schedule.steps[2 * loop.number + 1] for loop in self.schedule.program.loops}
+        return {loop.stream.path: self.schedule.steps[loop.phase] for loop in self.schedule.program.loops}
 
     @property
     def stages(self) -> Mapping[str, int]:
         """The stages of the arrays whose elements are computed by a pipeline."""
         depths = self.schedule.depths
-        loops = {loop.stream.path: 2 * loop.number + 1 for loop in self.schedule.program.loops}
+        loops = {loop.stream.path: loop.phase for loop in self.schedule.program.loops}
         return {path: depths[phase] + 1 for path, phase in loops.items() if phase in depths}
 
     @property

@@ -55,7 +55,7 @@ def _times(report: Report) -> Iterator[str]:
     chain = {link.operation.node.number for link in report.chain}
     begins = {phase: f"after '{cut(field, 50)}'" for phase, field in report.waits.items()}
     loops = report.schedule.program.loops
-    begins |= {2 * loop.number + 1: f"for each element of '{cut(loop.stream.path, 40)}'" for loop in loops}
+    begins |= {loop.phase: f"for each element of '{cut(loop.stream.path, 40)}'" for loop in loops}
     rows: list[tuple[str, ...]] = [("cycles", "", "operator", "line", "source")]
     for phase, found in groupby(report.operations, key=lambda item: item.node.phase):
         if phase in begins:
