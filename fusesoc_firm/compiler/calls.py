@@ -179,9 +179,9 @@ class Calls(Expressions):
                 return self._dict(node)
             case "tuple" | "list" if len(node.args) == 1:
                 values = self.fixed(node.args[0])
-                return tuple(values) if name == "tuple" else self.memory.new(Array(), dict(enumerate(values)))
+                return tuple(values) if name == "tuple" else self.list_of(values)
             case "list" if not node.args:
-                return self.memory.new(Array(), {})
+                return self.list_of([])
             case "sum" | "min" | "max" | "any" | "all" if len(node.args) == 1:
                 return self._reduced(name, node)
         if name not in CALLS:

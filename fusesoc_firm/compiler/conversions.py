@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from dataclasses import dataclass
 
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.kinds import BOOL, FLOAT, INT, Kind, number_of, result_kind
@@ -11,6 +12,14 @@ from fusesoc_firm.compiler.kinds import BOOL, FLOAT, INT, Kind, number_of, resul
 
 class UnmergeableError(Exception):
     """Two paths leave values that no hardware can hold in one place."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The kind of a number that changes again and again, and the limits of an integer."""
+
+    kind: Kind
+    limits: tuple[int, int]
 
 
 def converted(graph: Graph, value: Node, kind: Kind) -> Node:
@@ -117,8 +126,8 @@ def check_exact(value: Node, kind: Kind) -> None:
     raise UnmergeableError(f"a {value.kind} of Python and a {kind}")
 
 
-def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tuple[Kind, int, int]:
-    """Return the kind and limits of a number that is `first`, and is replaced by `after` again and again.
+def widened(first: Node, after: Node, known: Range | None) -> Range:
+    """Return the range of a number that is `first`, and is replaced by `after` again and again.
 
     `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
     """
@@ -126,9 +135,9 @@ def widened(first: Node, after: Node, known: tuple[Kind, int, int] | None) -> tu
     for value in (first, after):
         check_exact(value, kind)
     if kind.is_float:
-        return kind, 0, 0
+        return Range(kind, (0, 0))
     if kind.format:
-        return kind, *kind.limits
+        return Range(kind, kind.limits)
     limits = min(first.low, after.low), max(first.high, after.high)
     # A number that grows beyond expectation may grow each time.
-    return (kind, *(kind.limits if known and limits != known[1:] else limits))
+    return Range(kind, kind.limits if known and limits != known.limits else limits)

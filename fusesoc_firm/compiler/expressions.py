@@ -125,11 +125,9 @@ class Expressions(Names):
         if isinstance(one, Node) and isinstance(other, Node):
             return self.checked(node, self.arithmetic.binary, kind, one, other)
         if kind is ast.Mult and isinstance(one, Array) and isinstance(other, Node) and other.is_constant:
-            items = self.memory.items(one) * int(other.payload)
-            return self.memory.new(Array(), dict(enumerate(items)))
+            return self.list_of(self.memory.items(one) * int(other.payload))
         if kind is ast.Add and isinstance(one, Array) and isinstance(other, Array):
-            items = [*self.memory.items(one), *self.memory.items(other)]
-            return self.memory.new(Array(), dict(enumerate(items)))
+            return self.list_of([*self.memory.items(one), *self.memory.items(other)])
         if kind is ast.Add and isinstance(one, tuple) and isinstance(other, tuple):
             return one + other
         wrong = one if not isinstance(one, Node) else other
@@ -264,7 +262,7 @@ class Expressions(Names):
             self.refuse(whole, f"{described(owner)} has no slices", "loop over it")
         bounds = [None if item is None else self.integer(item) for item in (node.lower, node.upper, node.step)]
         values = self.elements(owner, whole)[slice(*bounds)]
-        return tuple(values) if isinstance(owner, tuple) else self.memory.new(Array(), dict(enumerate(values)))
+        return tuple(values) if isinstance(owner, tuple) else self.list_of(values)
 
     def elements(self, value: Value, node: ast.AST) -> Sequence[Value]:
         """Return the elements of a tuple or a list."""

@@ -10,7 +10,7 @@ from itertools import chain
 from typing import Any, NoReturn
 
 from fusesoc_firm.compiler.answers import Answer, AnswerMaker, Made
-from fusesoc_firm.compiler.conversions import UnmergeableError, converted, widened
+from fusesoc_firm.compiler.conversions import Range, UnmergeableError, converted, widened
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.interface import Side, message_value
@@ -120,7 +120,7 @@ def compile_function(task: Task) -> Program:
 
     The function is run until the kinds of its states are known. Unknown states have their first values.
     """
-    states: dict[str, tuple[Kind, int, int]] = {}
+    states: dict[str, Range] = {}
     for _ in range(_MOST_ROUNDS):
         try:
             run = _Run(task, states)
@@ -136,9 +136,7 @@ def compile_function(task: Task) -> Program:
     return source.refuse(source.module, "the types of the states cannot be determined", "give them a type of NumPy")
 
 
-def _assumed(
-    task: Task, states: dict[str, tuple[Kind, int, int]], error: InputError
-) -> dict[str, tuple[Kind, int, int]]:
+def _assumed(task: Task, states: dict[str, Range], error: InputError) -> dict[str, Range]:
     """Return further states: attributes that a method changes. Raise `error` if they do not help."""
     try:
         found = _Run(task, states, _changed_attributes(task.source.module)).changes()
@@ -169,7 +167,7 @@ def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
 class _Run:
     """One run of the function with states of given kinds; the attributes `assumed` are states, too, of first kinds."""
 
-    def __init__(self, task: Task, states: dict[str, tuple[Kind, int, int]], assumed: Collection[str] = ()) -> None:
+    def __init__(self, task: Task, states: dict[str, Range], assumed: Collection[str] = ()) -> None:
         self.name, self.inputs, self.outputs, self.states = task.name, task.inputs, task.outputs, states
         self.assumed = {*assumed}
         self.interpreter = Interpreter(task.source, on_global=self._enter)
@@ -218,10 +216,9 @@ class _Run:
             self.first[path] = value
             known = self.states.get(path)
             if known is None and isinstance(value, Node) and not self.assumed.isdisjoint(_NAME.findall(path)):
-                known = value.kind, value.low, value.high
+                known = Range(value.kind, (value.low, value.high))
             if known:
-                kind, *limits = known
-                leaf = self.graph.leaf("state", kind, path, (limits[0], limits[1]))
+                leaf = self.graph.leaf("state", known.kind, path, known.limits)
                 self.leaves[path] = leaf
                 self.interpreter.memory.cells[owner][key] = leaf
 
@@ -240,17 +237,18 @@ class _Run:
             else:
                 yield below, owner, key, value
 
-    def changes(self) -> dict[str, tuple[Kind, int, int]]:
-        """Return the states that the function changes beyond expectation, with their kinds and limits."""
-        found: dict[str, tuple[Kind, int, int]] = {}
+    def changes(self) -> dict[str, Range]:
+        """Return the states that the function changes beyond expectation, with their ranges."""
+        found: dict[str, Range] = {}
         after = {path: value for name in self.interpreter.module_names for path, _, _, value in self._cells(name)}
         for path in self.first.keys() - after.keys():
-            self._refuse(f"'{path}' is lost with a message", "keep the number of elements of lists")
+            self._refuse_state(path, "is lost with a message", "keep the number of elements of lists")
         for path, value in after.items():
             if path not in self.first and path.endswith("]"):
-                self._refuse(f"'{path}' grows with each message", "use a list of fixed size, and replace its elements")
+                hint = "use a list of fixed size, and replace its elements"
+                self._refuse_state(path, "grows with each message", hint)
             if path not in self.first:
-                self._refuse(f"'{path}' has no value before the first message", "give it one in __init__")
+                self._refuse_state(path, "has no value before the first message", "give it one in __init__")
             before = self.leaves.get(path, self.first[path])
             if value is before:
                 if path in self.leaves:
@@ -259,27 +257,27 @@ class _Run:
             if not isinstance(value, Node) or not isinstance(self.first[path], Node):
                 if self.first[path] is None:
                     hint = "give it a number in __init__, and a truth value of its own that tells whether it is set"
-                    self._refuse(f"'{path}' is None at first, and a state is a number", hint)
+                    self._refuse_state(path, "is None at first, and a state is a number", hint)
                 what = f"was {described(self.first[path])}, and becomes {described(value)}"
-                self._refuse(f"'{path}' {what}", "a state is a number")
+                self._refuse_state(path, what, "a state is a number")
             wanted = self._widened(path, self.first[path], value)
             if wanted != self.states.get(path):
                 found[path] = wanted
             else:
-                self.next[path] = converted(self.graph, value, wanted[0])
+                self.next[path] = converted(self.graph, value, wanted.kind)
         return found
 
-    def _widened(self, path: str, first: Node, value: Node) -> tuple[Kind, int, int]:
+    def _widened(self, path: str, first: Node, value: Node) -> Range:
         try:
             return widened(first, value, self.states.get(path))
         except UnmergeableError as error:
-            self._refuse(f"'{path}' is {error}", "give it one type, as int() or numpy.float32() does")
+            self._refuse_state(path, f"is {error}", "give it one type, as int() or numpy.float32() does")
 
-    def _refuse(self, message: str, hint: str = "") -> NoReturn:
-        """Refuse the function, or a state with whose path the message begins where the function first sets it."""
-        names = _NAME.findall(message.partition("'")[2].partition("'")[0])
+    def _refuse_state(self, path: str, what: str, hint: str) -> NoReturn:
+        """Refuse a state where the function first sets it."""
+        names = _NAME.findall(path)
         place = self._assignment(names[-1]) if names else None
-        self.interpreter.refuse(place or self.node, message, hint)
+        self.interpreter.refuse(place or self.node, f"'{path}' {what}", hint)
 
     def _assignment(self, name: str) -> ast.AST | None:
         """Return the first place at which a method, except for the one that constructs, sets an attribute."""
@@ -294,7 +292,7 @@ class _Run:
         states = [
             State(
                 path,
-                self.graph.constant(number_of(self.states[path][0], self.first[path].payload)),
+                self.graph.constant(number_of(self.states[path].kind, self.first[path].payload)),
                 leaf,
                 self.next[path],
             )
@@ -302,7 +300,7 @@ class _Run:
         ]
         answers = AnswerMaker(self.interpreter, _returned(self.node), self.outputs).answers(self.result)
         for message, hint in problems(answers, self.interpreter.loops, self.inputs):
-            self._refuse(message, hint)
+            self.interpreter.refuse(self.node, message, hint)
         program = Program(
             self.name,
             self.interpreter.source,

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from fusesoc_firm.compiler.calls import EXTREMES, Calls
-from fusesoc_firm.compiler.conversions import converted, widened
+from fusesoc_firm.compiler.conversions import Range, converted, widened
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.kinds import INT
 from fusesoc_firm.compiler.paths import Carried, Loop, Turns
@@ -239,18 +240,16 @@ class Repetition(Calls):
                     f"the loop leaves {described(after)} in '{what}', which was {described(before)}",
                     "a loop over an array carries numbers only",
                 )
-            expected = (known.value.kind, known.value.low, known.value.high) if known else None
+            expected = Range(known.value.kind, (known.value.low, known.value.high)) if known else None
             with self._merging(node):
                 wanted = widened(before, after, expected)
             if known and wanted == expected:
                 loop.carried[key].next = converted(self.graph, after, known.value.kind)
                 continue
-            kind, *limits = wanted
             # The number of the place, since elements of several lists have the same index.
-            leaf = self.graph.leaf(
-                "carried", kind, (loop.number, number, *limits), (limits[0], limits[1]), 2 * loop.number + 1
-            )
-            changed[key] = Carried(self._label(key, names, memory), converted(self.graph, before, kind), leaf)
+            payload = loop.number, number, *wanted.limits
+            leaf = self.graph.leaf("carried", wanted.kind, payload, wanted.limits, loop.phase)
+            changed[key] = Carried(self._label(key, names, memory), converted(self.graph, before, wanted.kind), leaf)
         return changed
 
     def _label(self, key: Any, names: Mapping[str, Value], memory: Memory) -> str:
@@ -292,19 +291,27 @@ class Repetition(Calls):
         iterated = self._iterated(first.iter)
         if isinstance(iterated, OverStream):
             return self._produced(node, first, iterated)
-        kept = dict(self.names)
         found: list[Value] = []
-        for item in iterated:
-            self.assign(first.target, item)
-            conditions = [self.truth(test) for test in first.ifs]
-            if any(not condition.is_constant for condition in conditions):
-                self.refuse(first.ifs[0], "the number of elements depends on a value", "use 'if' in the element")
-            if all(condition.payload for condition in conditions):
-                found.append(self.expression(node.elt))
-        self.names = kept
-        return self.memory.new(Array(), dict(enumerate(found)))
+        with self._own_names(first.target):
+            for item in iterated:
+                self.assign(first.target, item)
+                conditions = [self.truth(test) for test in first.ifs]
+                if any(not condition.is_constant for condition in conditions):
+                    self.refuse(first.ifs[0], "the number of elements depends on a value", "use 'if' in the element")
+                if all(condition.payload for condition in conditions):
+                    found.append(self.expression(node.elt))
+        return self.list_of(found)
 
     _value_generatorexp = _value_listcomp
+
+    @contextmanager
+    def _own_names(self, target: ast.expr, **own: Value) -> Iterator[None]:
+        """Run a comprehension: the names of its target, and those of `own`, are not those of the function."""
+        kept = dict(self.names)
+        hidden = {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}
+        self.names = {name: value for name, value in kept.items() if name not in hidden} | own
+        yield
+        self.names = {name: value if name in hidden else self.names[name] for name, value in kept.items()}
 
     def reduced_stream(self, name: str, node: ast.Call) -> Node | None:
         """Return the result of `min`, `sum` and so on of an array of variable size, or None for another argument."""
@@ -326,25 +333,20 @@ class Repetition(Calls):
         body: list[ast.stmt] = _reduction(name, item, node)
         for condition in reversed(part.ifs):
             body = [ast.copy_location(ast.If(condition, body, []), node)]
-        kept = dict(self.names)
-        self.names |= {"$result": first, "$found": self.graph.constant(value=False)}
-        self._for_stream(ast.copy_location(ast.For(part.target, part.iter, body, []), node), over)
-        result: Node = self.names["$result"]
-        self.names = {name: self.names[name] for name in kept}
+        with self._own_names(part.target, **{"$result": first, "$found": self.graph.constant(value=False)}):
+            self._for_stream(ast.copy_location(ast.For(part.target, part.iter, body, []), node), over)
+            result: Node = self.names["$result"]
         return result
 
     def _produced(self, node: ast.ListComp | ast.GeneratorExp, part: ast.comprehension, over: OverStream) -> Value:
         """Return the array that a comprehension over a stream makes, an element for each one."""
         if part.ifs:
             self.refuse(part.ifs[0], "the number of elements must be known before the first one", "send all elements")
-        array = self.memory.new(Array(), {})
+        array = self.list_of([])
         append = ast.Call(ast.Attribute(ast.Name("$made", ast.Load()), "append", ast.Load()), [node.elt], [])
         loop = ast.For(part.target, part.iter, [ast.Expr(append)], [])
         for item in (loop, *ast.walk(append)):
             ast.copy_location(item, node.elt)
-        kept = dict(self.names)
-        self.names["$made"] = array
-        self._for_stream(loop, over)
-        made = self.names["$made"]
-        self.names = {name: self.names[name] for name in kept}
-        return made
+        with self._own_names(part.target, **{"$made": array}):
+            self._for_stream(loop, over)
+            return self.names["$made"]

@@ -124,7 +124,8 @@ import math
 def folded(m):
     answer = {"nearest": 0.0, "total": len(m.points)}
     answer.nearest = min((p.x for p in m.points if p.y != 0.5), default=math.inf)
-    answer["count"] = sum(m.colors)
+    c = m.first
+    answer["count"] = sum(c for c in m.colors) + c
     # The name of an element has one value for each loop.
     p = "none"
     for p in m.corners:
@@ -180,8 +181,9 @@ def steps(m):
         "length: buffered",
         """
 def brighter(m):
-    scale = m.corners[0].x
-    return {"colors": [int(c * 1.25) + m.first for c in m.colors], "tail": round(scale * 2)}
+    c = m.corners[0].x
+    # The name of an element is one of the comprehension.
+    return {"colors": [int(c * 1.25) + m.first for c in m.colors], "tail": round(c * 2)}
 """,
     ),
     "partly": (
