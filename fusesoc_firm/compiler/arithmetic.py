@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -554,7 +554,7 @@ class Arithmetic:
             return self.graph.constant(value=False)
         return self._equal(self.absolute(value), self.graph.constant(number_of(value.kind, math.inf)))
 
-    def length(self, values: Sequence[Node]) -> Node:
+    def length(self, *values: Node) -> Node:
         """Return `math.hypot(x, y)` as the square root of the sum of squares."""
         squares = [self.binary(ast.Mult, item, item) for item in map(self.real, values)]
         total = squares[0]

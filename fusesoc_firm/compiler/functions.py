@@ -9,102 +9,95 @@ from types import MappingProxyType
 
 from fusesoc_firm.compiler.arithmetic import Arithmetic, RefusalError
 from fusesoc_firm.compiler.graph import Node
-from fusesoc_firm.compiler.kinds import FLOAT, INT, KINDS
+from fusesoc_firm.compiler.kinds import FLOAT, INT, KINDS, Kind
 
 _ANY = 100
+_Operation = Callable[..., Node]
 
 
 @dataclass(frozen=True)
 class Call:
-    """A function of numbers: the fewest and most arguments, and the operation."""
+    """A function of numbers: the operation, which takes an `Arithmetic` first, and the fewest and most numbers."""
 
-    fewest: int
-    most: int
-    make: Callable[[Arithmetic, list[Node]], Node]
+    make: _Operation
+    fewest: int = 1
+    most: int = 1
 
 
-def _folded(step: Callable[[Arithmetic, Node, Node], Node]) -> Callable[[Arithmetic, list[Node]], Node]:
-    """Return an operation on several numbers, applied from the left."""
+def _folded(step: Callable[[Arithmetic, Node, Node], Node]) -> Call:
+    """Return a function of several numbers, to which the operation is applied from the left."""
 
-    def run(arithmetic: Arithmetic, values: list[Node]) -> Node:
-        result = values[0]
-        for item in values[1:]:
+    def run(arithmetic: Arithmetic, result: Node, *others: Node) -> Node:
+        for item in others:
             result = step(arithmetic, result, item)
         return result
 
-    return run
+    return Call(run, 2, _ANY)
 
 
-def _round(arithmetic: Arithmetic, values: list[Node]) -> Node:
-    return arithmetic.rounded(values[0])
+def _modelled(name: str) -> _Operation:
+    return lambda arithmetic, *values: arithmetic.function(name, *values)
 
 
-def _float(arithmetic: Arithmetic, values: list[Node]) -> Node:
-    return arithmetic.real_to(values[0], FLOAT)
+def _of_numpy(make: _Operation) -> Call:
+    return Call(lambda arithmetic, value: make(arithmetic, arithmetic.of_numpy(value)))
 
 
-def _one(name: str) -> Call:
-    return Call(1, 1, lambda arithmetic, values: getattr(arithmetic, name)(values[0]))
+def _typed(kind: Kind) -> Call:
+    convert = Arithmetic.real_to if kind.is_float else Arithmetic.to
+    return Call(lambda arithmetic, value: convert(arithmetic, value, kind))
 
 
-def _of_numpy(name: str) -> Call:
-    return Call(1, 1, lambda arithmetic, values: getattr(arithmetic, name)(arithmetic.of_numpy(values[0])))
+def _int(arithmetic: Arithmetic, value: Node) -> Node:
+    return arithmetic.to(arithmetic.truncated(value), INT)
 
 
-def _typed(name: str) -> Call:
-    kind = KINDS[name]
-    if kind.is_float:
-        return Call(1, 1, lambda arithmetic, values: arithmetic.real_to(values[0], kind))
-    return Call(1, 1, lambda arithmetic, values: arithmetic.to(values[0], kind))
-
-
-def _magnitude(arithmetic: Arithmetic, values: list[Node]) -> Node:
-    value = values[0]
+def _magnitude(arithmetic: Arithmetic, value: Node) -> Node:
     return arithmetic.absolute(value if value.kind.format else arithmetic.real(value))
 
 
 _SHARED = {
-    "sqrt": _one("square_root"),
-    "fabs": Call(1, 1, _magnitude),
-    "isnan": _one("is_nan"),
-    "isinf": _one("is_infinite"),
-    "isfinite": _one("is_finite"),
-    "copysign": Call(2, 2, lambda arithmetic, values: arithmetic.copied_sign(*values)),
+    "sqrt": Call(Arithmetic.square_root),
+    "fabs": Call(_magnitude),
+    "isnan": Call(Arithmetic.is_nan),
+    "isinf": Call(Arithmetic.is_infinite),
+    "isfinite": Call(Arithmetic.is_finite),
+    "copysign": Call(Arithmetic.copied_sign, 2, 2),
+}
+# Those that compute with a float64 for a number of Python in NumPy, and with Python's float in `math`.
+_BY_MODEL: Mapping[str, _Operation] = {
+    "sin": Arithmetic.sine,
+    "cos": Arithmetic.cosine,
+    "tan": Arithmetic.tangent,
+    "exp": _modelled("exp"),
+    "log": _modelled("log"),
 }
 CALLS: Mapping[str, Call] = MappingProxyType(
     {
-        "abs": _one("absolute"),
-        "min": Call(2, _ANY, _folded(Arithmetic.smallest)),
-        "max": Call(2, _ANY, _folded(Arithmetic.largest)),
-        "round": Call(1, 1, _round),
-        "int": Call(1, 1, lambda arithmetic, values: arithmetic.to(arithmetic.truncated(values[0]), INT)),
-        "float": Call(1, 1, _float),
-        "bool": _one("truth"),
-        "math.floor": _one("floor"),
-        "math.ceil": _one("ceiling"),
-        "math.trunc": _one("truncated"),
-        "math.atan2": Call(2, 2, lambda arithmetic, values: arithmetic.function("atan2", *values)),
-        "math.fma": Call(3, 3, lambda arithmetic, values: arithmetic.function("multiply_add", *values)),
-        "math.exp": Call(1, 1, lambda arithmetic, values: arithmetic.function("exp", *values)),
-        "math.log": Call(1, 1, lambda arithmetic, values: arithmetic.function("log", *values)),
-        "math.sin": _one("sine"),
-        "math.cos": _one("cosine"),
-        "math.tan": _one("tangent"),
-        "math.atan": _one("angle"),
-        "math.asin": _one("arc_sine"),
-        "math.acos": _one("arc_cosine"),
-        "math.hypot": Call(1, _ANY, lambda arithmetic, values: arithmetic.length(values)),
-        "numpy.sin": _of_numpy("sine"),
-        "numpy.cos": _of_numpy("cosine"),
-        "numpy.tan": _of_numpy("tangent"),
-        "numpy.exp": Call(1, 1, lambda arithmetic, values: arithmetic.function("exp", arithmetic.of_numpy(values[0]))),
-        "numpy.log": Call(1, 1, lambda arithmetic, values: arithmetic.function("log", arithmetic.of_numpy(values[0]))),
-        "numpy.abs": _one("absolute"),
-        "numpy.absolute": _one("absolute"),
+        "abs": Call(Arithmetic.absolute),
+        "min": _folded(Arithmetic.smallest),
+        "max": _folded(Arithmetic.largest),
+        "round": Call(Arithmetic.rounded),
+        "int": Call(_int),
+        "float": _typed(FLOAT),
+        "bool": Call(Arithmetic.truth),
+        "math.floor": Call(Arithmetic.floor),
+        "math.ceil": Call(Arithmetic.ceiling),
+        "math.trunc": Call(Arithmetic.truncated),
+        "math.atan2": Call(_modelled("atan2"), 2, 2),
+        "math.fma": Call(_modelled("multiply_add"), 3, 3),
+        "math.atan": Call(Arithmetic.angle),
+        "math.asin": Call(Arithmetic.arc_sine),
+        "math.acos": Call(Arithmetic.arc_cosine),
+        "math.hypot": Call(Arithmetic.length, 1, _ANY),
+        "numpy.abs": Call(Arithmetic.absolute),
+        "numpy.absolute": Call(Arithmetic.absolute),
         **{f"math.{name}": call for name, call in _SHARED.items()},
         **{f"numpy.{name}": call for name, call in _SHARED.items()},
-        **{f"numpy.{name}": _typed(name) for name in KINDS if name != "bool"},
-        "numpy.bool_": _one("truth"),
+        **{f"math.{name}": Call(make) for name, make in _BY_MODEL.items()},
+        **{f"numpy.{name}": _of_numpy(make) for name, make in _BY_MODEL.items()},
+        **{f"numpy.{name}": _typed(kind) for name, kind in KINDS.items() if name != "bool"},
+        "numpy.bool_": Call(Arithmetic.truth),
     }
 )
 CONSTANTS: Mapping[str, float] = MappingProxyType(
@@ -123,4 +116,4 @@ def called(name: str, arithmetic: Arithmetic, values: list[Node]) -> Node:
     if not call.fewest <= len(values) <= call.most:
         wanted = str(call.fewest) if call.fewest == call.most else f"{call.fewest} or more"
         raise RefusalError(f"'{name}' takes {wanted} numbers in hardware, not {len(values)}")
-    return arithmetic.own(call.make(arithmetic, values))
+    return arithmetic.own(call.make(arithmetic, *values))
