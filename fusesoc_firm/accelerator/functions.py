@@ -181,7 +181,7 @@ def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
 
     The functions answer for the hardware: the model is called as that of a simulation.
     """
-    if not system.accelerators or not all(block.type.own.accelerator.is_compiled for block in system.accelerators):
+    if not system.is_compiled:
         return None
     hardware = Software(blocks=system.accelerators, connections=system.connections)
     functions = Functions.of(hardware, folder)

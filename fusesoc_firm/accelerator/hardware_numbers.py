@@ -22,7 +22,7 @@ import numpy as np
 from fusesoc_firm.accelerator.message import Message
 from fusesoc_firm.compiler.fixed import FixedNumber, Format, format_of
 from fusesoc_firm.compiler.functions import CALLS, CONSTANTS
-from fusesoc_firm.compiler.kinds import FLOAT32, FLOAT64, INTEGERS, floor_number, number_of, whole_number
+from fusesoc_firm.compiler.kinds import INTEGERS, floor_number, number_of, whole_number
 from fusesoc_firm.compiler.models import modelled
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, all_nodes
 
@@ -242,7 +242,7 @@ def _modelled(name: str) -> Callable[..., Any]:
 
     def run(*values: Any) -> Any:
         is_single = all(isinstance(value, np.float32) for value in values)
-        result = modelled(name, FLOAT32 if is_single else FLOAT64, *values)
+        result = modelled(name, 32 if is_single else 64, *values)
         if is_single:
             return np.float32(result)
         return np.float64(result) if any(isinstance(value, np.float64) for value in values) else result

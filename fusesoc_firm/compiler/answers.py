@@ -13,11 +13,11 @@ from typing import Any, NoReturn
 
 from fusesoc_firm.compiler.conversions import converted
 from fusesoc_firm.compiler.front import Interpreter
-from fusesoc_firm.compiler.graph import Node
+from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.interface import Elements, Leaf, Part, Side, places
 from fusesoc_firm.compiler.kinds import INTEGERS, Kind, number_of
 from fusesoc_firm.compiler.paths import Loop
-from fusesoc_firm.compiler.values import Array, Maybe, Produced, Record, Stream, Unbound, Value, described
+from fusesoc_firm.compiler.values import Array, Maybe, Memory, Produced, Record, Stream, Unbound, Value, described
 from fusesoc_firm.frame.model import Fixed, Path, all_nodes, names_of
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
@@ -85,6 +85,16 @@ class AnswerMaker:
     node: ast.AST
     outputs: Sequence[Side]
 
+    @property
+    def graph(self) -> Graph:
+        """The graph of the function."""
+        return self.interpreter.graph
+
+    @property
+    def memory(self) -> Memory:
+        """The contents of its lists and messages."""
+        return self.interpreter.memory
+
     def _refuse(self, message: str, hint: str = "") -> NoReturn:
         self.interpreter.refuse(self.node, message, hint)
 
@@ -106,13 +116,13 @@ class AnswerMaker:
         return value
 
     def _answer(self, side: Side, value: Value) -> Answer:
-        condition = self.interpreter.graph.true()
+        condition = self.graph.true()
         while isinstance(value, Maybe):
-            condition, value = self.interpreter.graph.both(condition, value.condition), value.value
+            condition, value = self.graph.both(condition, value.condition), value.value
         if value is None:
             return Answer(
                 side,
-                self.interpreter.graph.constant(value=False),
+                self.graph.constant(value=False),
                 self._fields(side, side.leaves, None),
                 [Sent(part, None) for part in side.parts],
             )
@@ -126,7 +136,7 @@ class AnswerMaker:
         return Answer(side, condition, fields, [self._sent(side, part, value) for part in side.parts])
 
     def _check_names(self, known: Any, value: Record, path: str = "") -> None:
-        for name, item in self.interpreter.memory.cells[value].items():
+        for name, item in self.memory.cells[value].items():
             if name not in known:
                 self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
             if isinstance(inner := item.value if isinstance(item, Maybe) else item, Record):
@@ -135,19 +145,14 @@ class AnswerMaker:
     def _fields(self, side: Side, leaves: Sequence[Leaf], value: Value, skipped: int = 0) -> dict[str, list[Node]]:
         """Return the fields of a message by their ports; `value` is that behind `skipped` steps of their paths."""
         found: dict[str, list[Node]] = {}
-        graph = self.interpreter.graph
         for leaf in leaves:
             self._check_lists(value, leaf.path, skipped)
             defaults = _defaults(side, leaf.path)
             for element, steps in enumerate(places(leaf.path)):
                 condition, given = self._at(value, steps[skipped:])
-                fallback = converted(
-                    self.interpreter.graph,
-                    self.interpreter.graph.constant(defaults[element % len(defaults)]),
-                    leaf.kind,
-                )
+                fallback = converted(self.graph, self.graph.constant(defaults[element % len(defaults)]), leaf.kind)
                 node = fallback if given is None else self._field(given, leaf.kind, steps)
-                found.setdefault(leaf.port, []).append(graph.choose(condition, node, fallback))
+                found.setdefault(leaf.port, []).append(self.graph.choose(condition, node, fallback))
         return found
 
     def _check_lists(self, value: Value, path: Path, skipped: int) -> None:
@@ -158,7 +163,7 @@ class AnswerMaker:
                 _, given = self._at(value, steps[skipped:])
                 count = len(given) if isinstance(given, tuple) else step.count
                 if isinstance(given, Array):
-                    count = len(self.interpreter.memory.cells[given])
+                    count = len(self.memory.cells[given])
                 if count != step.count:
                     name = dotted(names_of(path[:number]))
                     hint = f"return a list of {step.count}"
@@ -166,16 +171,16 @@ class AnswerMaker:
 
     def _at(self, value: Value, steps: Sequence[str | int]) -> tuple[Node, Value]:
         """Return the value at a path of an answer, or None without one, and the condition that it is there."""
-        condition = self.interpreter.graph.true()
+        condition = self.graph.true()
         for step in (*steps, None):
             while isinstance(value, Maybe):
-                condition, value = self.interpreter.graph.both(condition, value.condition), value.value
+                condition, value = self.graph.both(condition, value.condition), value.value
             if step is None or value is None:
                 break
             if isinstance(value, tuple) and isinstance(step, int):
                 value = value[step] if step < len(value) else None
             elif isinstance(value, Record | Array):
-                value = self.interpreter.memory.cells[value].get(step)
+                value = self.memory.cells[value].get(step)
             else:
                 self._refuse(f"field '{step}' is in {described(value)}, which has no fields")
         return condition, value
@@ -210,7 +215,7 @@ class AnswerMaker:
             case None | "" if not is_fixed:
                 return Sent(part, None)
             case Array() | tuple():
-                items = given if isinstance(given, tuple) else self.interpreter.memory.items(given)
+                items = given if isinstance(given, tuple) else self.memory.items(given)
                 return Sent(part, self._listed(side, part, items) if items else None)
             case str() if isinstance(part, Part) and part.kind is None:
                 return Sent(part, self._text(part, given))
@@ -225,7 +230,7 @@ class AnswerMaker:
         if isinstance(part, Elements) and not part.leaves:
             hint = "pass one of the message on, or leave it out"
             self._refuse(f"'{dotted(names_of(part.path))}' is an array of texts, which lists do not make", hint)
-        length = self.interpreter.graph.constant(len(items))
+        length = self.graph.constant(len(items))
         return Listed(length, [self._element(side, part, item) for item in items])
 
     def _text(self, part: Part, text: str) -> Listed:
@@ -233,9 +238,9 @@ class AnswerMaker:
         data = text.encode("utf-8" if part.bits == _BYTE else "utf-16-le")
         units = struct.unpack(f"<{len(data) * _BYTE // part.bits}{'B' if part.bits == _BYTE else 'H'}", data)
         self._check_count(part, len(units))
-        graph, kind = self.interpreter.graph, INTEGERS[f"uint{part.bits}"]
-        nodes = [graph.constant(number_of(kind, unit)) for unit in units]
-        return Listed(graph.constant(len(units)), [{part.stream: [node]} for node in nodes])
+        kind = INTEGERS[f"uint{part.bits}"]
+        nodes = [self.graph.constant(number_of(kind, unit)) for unit in units]
+        return Listed(self.graph.constant(len(units)), [{part.stream: [node]} for node in nodes])
 
     def _check_count(self, part: Part | Elements, count: int) -> None:
         """Refuse a number of elements that the message does not have."""
@@ -265,16 +270,10 @@ class AnswerMaker:
         return self._fields(side, part.leaves, value, len(names))
 
 
-def _defaults(side: Side, path: Any) -> list[Any]:
+def _defaults(side: Side, path: Path) -> Sequence[Any]:
     """Return the default values of a field's elements."""
-    leaf = next(item for item in _leaves(side) if item.path == path)
-    given = leaf.default
-    if given is None:
+    fields = chain(*(node.fields for node in all_nodes(side.frame.nodes) if isinstance(node, Fixed)))
+    leaf = next(item for item in fields if item.path == path)
+    if leaf.default is None:
         return [False if leaf.type.name == "bool" else 0]
-    return [*given] if isinstance(given, tuple) else [given]
-
-
-def _leaves(side: Side) -> Iterator[Any]:
-    for node in all_nodes(side.frame.nodes):
-        if isinstance(node, Fixed):
-            yield from node.fields
+    return leaf.default if isinstance(leaf.default, tuple) else [leaf.default]

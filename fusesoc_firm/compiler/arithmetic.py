@@ -133,8 +133,7 @@ class Arithmetic:
                     f"{value.payload} is out of the range of {kind}, {low} to {high}", "NumPy refuses it, too"
                 )
         if value.kind == BOOL and not value.is_constant and kind != BOOL:
-            integer = self.graph.node("wrap", (value,), INT, limits=(0, 1))
-            return converted(self.graph, integer, kind)
+            return converted(self.graph, integer_of(self.graph, value), kind)
         try:
             return converted(self.graph, value, kind)
         except UnmergeableError as error:
@@ -219,7 +218,8 @@ class Arithmetic:
         if kind.is_float:
             raise RefusalError("there are no bit operations on floats", "convert with int()")
         if kind == BOOL:
-            return {"and": self.graph.both, "or": self.graph.either}.get(name, self._unequal)(one, other)
+            whole = {"and": self.graph.both, "or": self.graph.either}.get(name)
+            return whole(one, other) if whole else self.graph.node(name, (one, other), BOOL, limits=(0, 1))
         one, other = self._to(one, kind), self._to(other, kind)
         limits = None
         if kind == INT:
@@ -227,9 +227,6 @@ class Arithmetic:
             has_sign = one.low < 0 or other.low < 0
             limits = (-(1 << bits) if has_sign else 0, (1 << bits) - 1)
         return self.graph.node(name, (one, other), kind, limits=limits)
-
-    def _unequal(self, one: Node, other: Node) -> Node:
-        return self.graph.node("xor", (one, other), BOOL, limits=(0, 1))
 
     def _shift(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         if not other.is_constant:
@@ -365,10 +362,8 @@ class Arithmetic:
         if one.kind.format or other.kind.format:
             kind = one.kind if one.kind.format else other.kind
             return self._to(one, kind), self._to(other, kind)
-        widened = [
-            self.graph.node("wrap", (item,), INT, limits=(0, 1)) if item.kind == BOOL else item for item in (one, other)
-        ]
-        return widened[0], widened[1]
+        one, other = (integer_of(self.graph, item) if item.kind == BOOL else item for item in (one, other))
+        return one, other
 
     def truth(self, value: Node) -> Node:
         """Return `bool(value)`."""
@@ -438,7 +433,7 @@ class Arithmetic:
             kind = result_kind(operator.add, kind, item.kind)
         operands = [self._to(item, kind) for item in operands]
         if all(item.is_constant for item in operands):
-            return self.graph.constant(number_of(kind, modelled(name, kind, *(item.payload for item in operands))))
+            return self.graph.constant(number_of(kind, modelled(name, kind.bits, *(item.payload for item in operands))))
         return self.graph.node(name, operands, kind)
 
     def sine(self, value: Node) -> Node:
@@ -457,7 +452,7 @@ class Arithmetic:
         """Return one of the results of the operator for both."""
         angle = self.real(value)
         if angle.is_constant:
-            return self.graph.constant(number_of(angle.kind, modelled(name, angle.kind, angle.payload)))
+            return self.graph.constant(number_of(angle.kind, modelled(name, angle.kind.bits, angle.payload)))
         both = self.graph.node("sincos", (angle,), pair_of(angle.kind))
         return self.graph.node(part, (both,), angle.kind)
 

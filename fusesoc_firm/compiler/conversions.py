@@ -58,8 +58,7 @@ def integer_of(graph: Graph, value: Node) -> Node:
         return graph.constant(value.low)
     if value.kind == INT:
         return value
-    limits = (0, 1) if value.kind == BOOL else (value.low, value.high)
-    return graph.node("wrap", (value,), INT, limits=limits)
+    return graph.node("wrap", (value,), INT, limits=(value.low, value.high))
 
 
 def shifted(graph: Graph, value: Node, count: int) -> Node:
@@ -73,7 +72,7 @@ def saturated(graph: Graph, units: Node, kind: Kind) -> Node:
     """Return the fixed-point number with some units, or the nearest one."""
     if units.is_constant:
         assert kind.format
-        return graph.constant(kind.format.nearest(units.low))
+        return graph.constant(kind.format.of_units(units.low))
     least, most = kind.limits
     limits = min(max(units.low, least), most), min(max(units.high, least), most)
     operation = "wrap" if limits == (units.low, units.high) else "saturate"

@@ -1,7 +1,7 @@
 """Fixed-point numbers: the values that the entities of `robot:acc:firm_fixed` compute, as numbers of Python.
 
-Every result is the nearest number, ties to even, and saturates. A number by zero is the largest or smallest one, by its
-sign, and 0 by 0 is 0. The other operand of an operation, an integer or a float, is converted first.
+The model of that core rounds each exact result. The other operand of an operation, an integer or a float, is converted
+first.
 """
 
 from __future__ import annotations
@@ -10,9 +10,12 @@ import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+
+from fusesoc_firm.compiler.models import core_model
 
 MOST_BITS = 48
 """The most bits of a number: a float64 holds each of them."""
@@ -40,8 +43,12 @@ class Format:
 
     def holds(self, value: Any) -> bool:
         """Whether a number is not out of range; infinities are the smallest and largest numbers."""
-        least, most = self.limits
-        return not math.isfinite(value) or least <= round(_exact(value) * (1 << self.fraction)) <= most
+        return not math.isfinite(value) or not self.model.fitted(_exact(value))[1]
+
+    @cached_property
+    def model(self) -> Any:
+        """The model of the operators for these numbers, which rounds and saturates."""
+        return core_model("fixed").Format(self.width, self.fraction)
 
     def number(self, value: Any) -> FixedNumber:
         """Return the number nearest to another one; NaN is 0."""
@@ -49,12 +56,15 @@ class Format:
             return value
         if isinstance(value, float | np.floating) and not math.isfinite(value):
             return FixedNumber(self, 0 if math.isnan(value) else self.limits[int(value > 0)])
-        return self.nearest(_exact(value) * (1 << self.fraction))
+        return self.nearest(_exact(value))
 
-    def nearest(self, units: Fraction | int) -> FixedNumber:
+    def nearest(self, exact: Fraction) -> FixedNumber:
+        """Return the number nearest to a value."""
+        return FixedNumber(self, self.model.fitted(exact)[0])
+
+    def of_units(self, units: int) -> FixedNumber:
         """Return the number nearest to some units of 2**-fraction."""
-        least, most = self.limits
-        return FixedNumber(self, min(max(round(units), least), most))
+        return self.nearest(Fraction(units, 1 << self.fraction))
 
     def __str__(self) -> str:
         return f"fixed({self.width}, {self.fraction})"
@@ -84,62 +94,64 @@ class FixedNumber:
     # NumPy's numbers leave the operation to this class.
     __array_ufunc__ = None
 
-    def _units(self, other: Any) -> int:
-        return self.format.number(other).units
+    @property
+    def exact(self) -> Fraction:
+        """The value of the number."""
+        return Fraction(self.units, 1 << self.format.fraction)
+
+    def _exact(self, other: Any) -> Fraction:
+        return self.format.number(other).exact
 
     def __add__(self, other: Any) -> FixedNumber:
-        return self.format.nearest(self.units + self._units(other))
+        return self.format.nearest(self.exact + self._exact(other))
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> FixedNumber:
-        return self.format.nearest(self.units - self._units(other))
+        return self.format.nearest(self.exact - self._exact(other))
 
     def __rsub__(self, other: Any) -> FixedNumber:
         return self.format.number(other) - self
 
     def __mul__(self, other: Any) -> FixedNumber:
-        return self.format.nearest(Fraction(self.units * self._units(other), 1 << self.format.fraction))
+        return self.format.nearest(self.exact * self._exact(other))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> FixedNumber:
-        divisor = self._units(other)
-        if divisor:
-            return self.format.nearest(Fraction(self.units << self.format.fraction, divisor))
-        return self.format.number(math.copysign(math.inf, self.units) if self.units else 0)
+        return FixedNumber(self.format, self.format.model.quotient(self.exact, self._exact(other))[0])
 
     def __rtruediv__(self, other: Any) -> FixedNumber:
         return self.format.number(other) / self
 
     def __neg__(self) -> FixedNumber:
-        return self.format.nearest(-self.units)
+        return self.format.nearest(-self.exact)
 
     def __pos__(self) -> FixedNumber:
         return self
 
     def __abs__(self) -> FixedNumber:
-        return self.format.nearest(abs(self.units))
+        return self.format.nearest(abs(self.exact))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FixedNumber | int | float | np.number | np.bool_):
             return NotImplemented
-        return self.units == self._units(other)
+        return self.exact == self._exact(other)
 
     def __lt__(self, other: Any) -> bool:
-        return self.units < self._units(other)
+        return self.exact < self._exact(other)
 
     def __le__(self, other: Any) -> bool:
-        return self.units <= self._units(other)
+        return self.exact <= self._exact(other)
 
     def __gt__(self, other: Any) -> bool:
-        return self.units > self._units(other)
+        return self.exact > self._exact(other)
 
     def __ge__(self, other: Any) -> bool:
-        return self.units >= self._units(other)
+        return self.exact >= self._exact(other)
 
     def __hash__(self) -> int:
-        return hash(Fraction(self.units, 1 << self.format.fraction))
+        return hash(self.exact)
 
     def __bool__(self) -> bool:
         return self.units != 0
@@ -148,19 +160,18 @@ class FixedNumber:
         return math.ldexp(self.units, -self.format.fraction)
 
     def __trunc__(self) -> int:
-        whole = abs(self.units) >> self.format.fraction
-        return whole if self.units >= 0 else -whole
+        return math.trunc(self.exact)
 
     __int__ = __trunc__
 
     def __floor__(self) -> int:
-        return self.units >> self.format.fraction
+        return math.floor(self.exact)
 
     def __ceil__(self) -> int:
-        return -(-self.units >> self.format.fraction)
+        return math.ceil(self.exact)
 
     def __round__(self) -> int:
-        return round(Fraction(self.units, 1 << self.format.fraction))
+        return round(self.exact)
 
     def real(self) -> np.floating[Any]:
         """Return the number as the float with which functions are computed."""

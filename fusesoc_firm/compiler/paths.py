@@ -51,6 +51,12 @@ class Carried:
     value: Node
     next: Node | None = None
 
+    def sources(self) -> Iterator[Node]:
+        """Yield the values that the register loads."""
+        yield self.first
+        if self.next is not None:
+            yield self.next
+
 
 @dataclass
 class Loop:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NoReturn
@@ -15,7 +15,7 @@ from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.interface import Side, message_value
 from fusesoc_firm.compiler.kinds import Kind, number_of
-from fusesoc_firm.compiler.paths import Carried, Loop
+from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.streaming import late, problems
 from fusesoc_firm.compiler.values import Array, Class, Function, Instance, Named, Record, Value, described
@@ -50,17 +50,15 @@ class Program:
 
     def results(self) -> Iterator[Node]:
         """Yield all nodes whose values the hardware needs."""
-        for state in self.states:
-            yield state.next
-        for loop in self.loops:
-            for item in loop.carried.values():
-                yield item.first
-                if item.next is not None:
-                    yield item.next
-        for made in self.made():
-            yield from chain(*made.fields.values())
-        for answer in self.answers:
-            yield from answer.nodes()
+        yield from self._kept()
+        for item in chain(*(loop.carried.values() for loop in self.loops)):
+            yield from item.sources()
+
+    def _kept(self) -> Iterator[Node]:
+        """Yield the values that leave the function: answers and next states."""
+        yield from (state.next for state in self.states)
+        yield from chain(*(chain(*made.fields.values()) for made in self.made()))
+        yield from chain(*(answer.nodes() for answer in self.answers))
 
     def made(self) -> Iterator[Made]:
         """Yield the arrays that loops make."""
@@ -68,39 +66,29 @@ class Program:
 
     def needed(self) -> list[Node]:
         """Return the nodes that results depend on, in their order."""
-        found = self._reached([*self.results()])
+        found = self._reached(self.results())
         return [item for item in self.graph.nodes if item.number in found]
 
     def drop_unused(self) -> None:
         """Remove the carried values of loops on which no result depends, such as an index that nobody reads."""
-        used = {id(item) for loop in self.loops for item in loop.carried.values()}
-        while True:
-            read = self._reached([*self.results()])
-            kept = {id(item) for loop in self.loops for item in loop.carried.values() if self._is_read(item, read)}
-            if kept == used:
-                return
-            used = kept
-            for loop in self.loops:
-                loop.carried = {key: item for key, item in loop.carried.items() if id(item) in kept}
+        read = self._reached(self._kept())
+        for loop in self.loops:
+            loop.carried = {key: item for key, item in loop.carried.items() if item.value.number in read}
 
-    def _is_read(self, item: Carried, read: set[int]) -> bool:
-        """Whether other values than its own next one depend on a carried value."""
-        leaves = {item.value.number}
-        leaves |= {
-            node.number for node in self.graph.nodes if node.operation == "final" and node.payload == item.value.payload
-        }
-        others = [node for node in self.results() if node is not item.next]
-        return bool(leaves & self._reached(others)) if leaves & read else False
-
-    def _reached(self, results: Sequence[Node]) -> set[int]:
-        """Return the numbers of all nodes that results depend on."""
+    def _reached(self, results: Iterable[Node]) -> set[int]:
+        """Return the numbers of all nodes that results depend on, also through values that loops carry."""
+        carried = {item.value.payload: item for loop in self.loops for item in loop.carried.values()}
         found: set[int] = set()
         waiting = [*results]
         while waiting:
-            item = waiting.pop()
-            if item.number not in found:
-                found.add(item.number)
-                waiting += item.operands
+            node = waiting.pop()
+            if node.number in found:
+                continue
+            found.add(node.number)
+            waiting += node.operands
+            if node.operation in ("carried", "final"):
+                item = carried[node.payload]
+                waiting += [item.value, *item.sources()]
         return found
 
 

@@ -551,6 +551,11 @@ class DerivedSystem:
         """The number of bytes in a frame's id."""
         return 2 if self.tree else 1
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the system's functions in Python are its model: those of all accelerators in hardware."""
+        return bool(self.accelerators) and all(item.type.own.accelerator.is_compiled for item in self.accelerators)
+
     @cached_property
     def places(self) -> Mapping[int, int]:
         """The index of each publisher's Manager input, by id."""

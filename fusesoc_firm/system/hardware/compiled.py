@@ -8,6 +8,7 @@ from typing import NoReturn
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import kind_named
+from fusesoc_firm.compiler.models import model_files
 from fusesoc_firm.compiler.operators import table_files
 from fusesoc_firm.compiler.program import Program, Task, compile_function
 from fusesoc_firm.compiler.schedule import RELEASE, Schedule
@@ -43,7 +44,7 @@ def entity_of(type_: AcceleratorType, schedule: Schedule) -> Rendering:
 
 def compiler_files() -> list[Path]:
     """Return the files, beside the source, that determine the entity."""
-    return [*table_files(), table_files()[0].with_name("model.py")]
+    return [*table_files(), *model_files()]
 
 
 def schedule_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Schedule:

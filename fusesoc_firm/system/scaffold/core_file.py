@@ -82,9 +82,9 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
     if path.exists():
         return updated_core(loaded.system, path)
     folder = path.absolute().parent
-    compiled = [item.type.own.accelerator.is_compiled for item in loaded.system.accelerators]
-    is_model = all(compiled) and any(compiled) and options.model == MODEL and not (folder / MODEL).exists()
-    own = [_PYTHON] if any(compiled) and not any(item.startswith(_PYTHON) for item in options.depend) else []
+    is_model = loaded.system.is_compiled and options.model == MODEL and not (folder / MODEL).exists()
+    has_compiled = any(item.type.own.accelerator.is_compiled for item in loaded.system.accelerators)
+    own = [_PYTHON] if has_compiled and not any(item.startswith(_PYTHON) for item in options.depend) else []
     options = replace(
         options,
         depend=[*options.depend, *own, *loaded.specification.message_cores],
