@@ -11,6 +11,7 @@ from fusesoc_firm.compiler.expressions import Expressions
 from fusesoc_firm.compiler.functions import CALLS, called
 from fusesoc_firm.compiler.graph import Node
 from fusesoc_firm.compiler.names import bound_names
+from fusesoc_firm.compiler.source import stored_attributes
 from fusesoc_firm.compiler.values import (
     Array,
     Class,
@@ -161,8 +162,7 @@ class Calls(Expressions):
 
     def _set_class_attributes(self, made: Instance) -> None:
         """Give an object the values of its class that its methods change, which are its own from then on."""
-        nodes = (node for node in ast.walk(made.type) if isinstance(node, ast.Attribute))
-        changed = {node.attr for node in nodes if isinstance(node.ctx, ast.Store)}
+        changed = {item.attr for item in stored_attributes(made.type)}
         for item in made.type.body:
             if isinstance(item, ast.Assign | ast.AnnAssign) and item.value:
                 for name in sorted(changed.intersection(bound_names(item))):

@@ -16,7 +16,7 @@ from fusesoc_firm.compiler.graph import Graph, Node
 from fusesoc_firm.compiler.interface import Side, message_value
 from fusesoc_firm.compiler.kinds import Kind, number_of
 from fusesoc_firm.compiler.paths import Loop
-from fusesoc_firm.compiler.source import Source
+from fusesoc_firm.compiler.source import Source, stored_attributes
 from fusesoc_firm.compiler.streaming import late, problems
 from fusesoc_firm.compiler.values import Array, Class, Function, Instance, Named, Record, Value, described
 from fusesoc_firm.text.diagnostics import InputError, nearest
@@ -127,23 +127,12 @@ def compile_function(task: Task) -> Program:
 def _assumed(task: Task, states: dict[str, Range], error: InputError) -> dict[str, Range]:
     """Return further states: attributes that a method changes. Raise `error` if they do not help."""
     try:
-        found = _Run(task, states, _changed_attributes(task.source.module)).changes()
+        found = _Run(task, states, {item.attr for item in stored_attributes(task.source.module)}).changes()
     except InputError:
         raise error from None
     if not found:
         raise error
     return found
-
-
-def _changed_attributes(module: ast.Module) -> set[str]:
-    """Return the attributes to which, or to whose elements, a function assigns, except for those that construct."""
-    functions = [node for node in ast.walk(module) if isinstance(node, ast.FunctionDef) and node.name != "__init__"]
-    targets = [
-        node
-        for node in chain(*map(ast.walk, functions))
-        if isinstance(node, ast.Attribute | ast.Subscript) and isinstance(node.ctx, ast.Store)
-    ]
-    return {node.attr for node in chain(*map(ast.walk, targets)) if isinstance(node, ast.Attribute)}
 
 
 def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
@@ -263,17 +252,10 @@ class _Run:
 
     def _refuse_state(self, path: str, what: str, hint: str) -> NoReturn:
         """Refuse a state where the function first sets it."""
-        names = _NAME.findall(path)
-        place = self._assignment(names[-1]) if names else None
-        self.interpreter.refuse(place or self.node, f"'{path}' {what}", hint)
-
-    def _assignment(self, name: str) -> ast.AST | None:
-        """Return the first place at which a method, except for the one that constructs, sets an attribute."""
-        module = self.interpreter.source.module
-        functions = [item for item in ast.walk(module) if isinstance(item, ast.FunctionDef) and item.name != "__init__"]
-        places = (item for function in functions for item in ast.walk(function) if isinstance(item, ast.Attribute))
-        stores = [item for item in places if item.attr == name and isinstance(item.ctx, ast.Store)]
-        return min(stores, key=lambda item: (item.lineno, item.col_offset), default=None)
+        last = _NAME.findall(path)[-1:]
+        stores = [item for item in stored_attributes(self.interpreter.source.module) if item.attr in last]
+        place = min(stores, key=lambda item: (item.lineno, item.col_offset), default=self.node)
+        self.interpreter.refuse(place, f"'{path}' {what}", hint)
 
     def program(self) -> Program:
         """Return the program of this run."""

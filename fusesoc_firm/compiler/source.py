@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NoReturn
@@ -91,3 +92,12 @@ class Source:
             type(node), (f"'{type(node).__name__}' is not hardware", "see docs/reference/python.md")
         )
         self.refuse(node, what, remedy)
+
+
+def stored_attributes(tree: ast.AST) -> Iterator[ast.Attribute]:
+    """Yield the attributes to which, or to whose elements, functions assign, except for those that construct."""
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef) and function.name != "__init__":
+            for target in ast.walk(function):
+                if isinstance(target, ast.Attribute | ast.Subscript) and isinstance(target.ctx, ast.Store):
+                    yield from (node for node in ast.walk(target) if isinstance(node, ast.Attribute))

@@ -120,6 +120,7 @@ def reused(m):
     "state": """
 class State:
     total = 0.0
+    counts = [0, 0]
 
     def __init__(self):
         self.count = 0
@@ -127,11 +128,15 @@ class State:
 
     def __call__(self, m):
         self.count += 1
+        self.counts[m.k & 1] += 2
         if m.q:
             return None
         self.total += m.a
         self.past = [m.c, self.past[0], self.past[1]]
-        return {"a": self.total, "n": self.count, "v": self.past, "c": max(self.past[2], m.d)}
+        return {
+            "a": self.total, "n": self.count, "v": self.past, "c": max(self.past[2], m.d), "i": self.counts[0],
+            "j": self.counts[1],
+        }
 
 
 state = State()
