@@ -6,7 +6,7 @@ import ast
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import partial, reduce
 from itertools import chain
 from operator import getitem
 from typing import Any, NoReturn
@@ -191,12 +191,13 @@ class AnswerMaker:
             self._refuse(f"field '{name}' has no value on one of the paths", "give it one on each path")
         if not isinstance(value, Node):
             self._refuse(f"field '{name}' is {described(value)}, not a number")
-        if value.kind.is_real and not kind.is_float:
+        if any(item.is_real for item in value.kinds) and not kind.is_float:
             self._refuse(
-                f"field '{name}' is an integer ({kind}), and the answer is a {value.kind}",
+                f"field '{name}' is an integer ({kind}), and the answer is {described(value)}",
                 "convert it with int() or round()",
             )
-        made: Node = self.interpreter.checked(self.node, self.interpreter.arithmetic.to, value, kind)
+        arithmetic = self.interpreter.arithmetic
+        made: Node = self.interpreter.checked(self.node, arithmetic.each, partial(arithmetic.to, kind=kind), value)
         return made
 
     def _sent(self, side: Side, part: Part | Elements, value: Record) -> Sent:

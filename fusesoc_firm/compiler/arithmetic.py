@@ -9,18 +9,20 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from fusesoc_firm.compiler.conversions import (
     UnmergeableError,
-    check_exact,
-    common_kind,
+    chosen,
     converted,
     integer_of,
+    of_each,
     saturated,
     shifted,
 )
@@ -33,6 +35,7 @@ from fusesoc_firm.compiler.kinds import (
     FLOAT64,
     INT,
     INTEGERS,
+    MIXED,
     Kind,
     fixed_kind,
     floor_number,
@@ -82,6 +85,8 @@ class Arithmetic:
 
     def binary(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         """Return `one <operator> other`."""
+        if MIXED in (one.kind, other.kind):
+            return self._of_mixed(partial(self.binary, kind), one, other, self._kinds(_OPERATORS[kind], one, other))
         if kind is ast.Pow:
             return self._power(one, other)
         if one.is_constant and other.is_constant:
@@ -102,6 +107,28 @@ class Arithmetic:
         compute = self._fixed if result.format else self._float if result.is_float else self._integer
         return compute(_NAMES[kind], self._to(one, result), self._to(other, result), result)
 
+    def each(self, operation: Callable[..., Node], *operands: Node) -> Node:
+        """Return the result of an operation for each kind of its operands; that of the path is chosen."""
+        mixed = next((item for item in operands if item.kind == MIXED), None)
+        if mixed is None:
+            return operation(*operands)
+
+        def of_one(alternative: Node) -> Node:
+            return self.each(operation, *(alternative if item is mixed else item for item in operands))
+
+        return of_each(self.graph, mixed, of_one)
+
+    def _of_mixed(self, operation: Callable[[Node, Node], Node], one: Node, other: Node, kinds: set[Kind]) -> Node:
+        """Return the result of an operation that computes in one of `kinds`, as the path decides."""
+        if len(kinds) > 1:
+            return self.each(operation, one, other)
+        (kind,) = kinds
+        return operation(self.each(partial(self._to, kind=kind), one), self.each(partial(self._to, kind=kind), other))
+
+    def _kinds(self, operation: Callable[..., Any], *operands: Node) -> set[Kind]:
+        """Return the kinds that a result may have, as NumPy has it."""
+        return {self._result_kind(operation, kinds) for kinds in product(*(item.kinds for item in operands))}
+
     def _folded(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         try:
             with np.errstate(all="ignore"):
@@ -116,11 +143,14 @@ class Arithmetic:
 
     def _result(self, operation: Callable[..., Any], *operands: Node) -> Kind:
         """Return the kind of a result, as NumPy has it."""
+        return self._result_kind(operation, [item.kind for item in operands])
+
+    def _result_kind(self, operation: Callable[..., Any], kinds: Sequence[Kind]) -> Kind:
         try:
-            return result_kind(operation, *(item.kind for item in operands))
+            return result_kind(operation, *kinds)
         except TypeError:
-            kinds = " and ".join(f"a {item.kind}" for item in operands)
-            raise RefusalError(f"there is no such operation on {kinds}", "convert with int() or float()") from None
+            names = " and ".join(f"a {kind}" for kind in kinds)
+            raise RefusalError(f"there is no such operation on {names}", "convert with int() or float()") from None
 
     def _to(self, value: Node, kind: Kind) -> Node:
         """Return an operand in the kind of its operation."""
@@ -319,6 +349,8 @@ class Arithmetic:
 
     def compare(self, kind: type[ast.cmpop], one: Node, other: Node) -> Node:
         """Return the truth value of a comparison."""
+        if MIXED in (one.kind, other.kind):
+            return self._of_mixed(partial(self.compare, kind), one, other, self._compared_kinds(one, other))
         match kind:
             case ast.Gt:
                 return self._less(other, one)
@@ -335,6 +367,11 @@ class Arithmetic:
         raise RefusalError(
             f"'{ {ast.In: 'in', ast.NotIn: 'not in'}.get(kind, 'is') }' is not hardware", "compare with '=='"
         )
+
+    def _compared_kinds(self, one: Node, other: Node) -> set[Kind]:
+        """Return the kinds in which mixed numbers are compared: integers are compared by their values."""
+        is_real = any(kind.is_real for kind in (*one.kinds, *other.kinds))
+        return self._kinds(operator.add, one, other) if is_real else {INT}
 
     def _less(self, one: Node, other: Node) -> Node:
         pair = self._comparable(one, other)
@@ -373,23 +410,16 @@ class Arithmetic:
         return self.graph.opposite(self._equal(value, zero))
 
     def choose(self, condition: Node, one: Node, other: Node) -> Node:
-        """Return one of two numbers, in their common kind."""
-        try:
-            kind = common_kind(one.kind, other.kind)
-            for value in (one, other):
-                check_exact(value, kind)
-        except UnmergeableError as error:
-            hint = "give both the same type, as int() or numpy.float32() does"
-            raise RefusalError(f"{error} are not one kind of number", hint) from None
-        return self.graph.choose(condition, self._to(one, kind), self._to(other, kind))
+        """Return one of two numbers."""
+        return chosen(self.graph, condition, one, other)
 
     def largest(self, one: Node, other: Node) -> Node:
         """Return Python's `max(one, other)`: the first operand unless the other one is greater."""
-        return self.choose(self._less(one, other), other, one)
+        return self.choose(self.compare(ast.Lt, one, other), other, one)
 
     def smallest(self, one: Node, other: Node) -> Node:
         """Return Python's `min(one, other)`: the first operand unless the other one is less."""
-        return self.choose(self._less(other, one), other, one)
+        return self.choose(self.compare(ast.Lt, other, one), other, one)
 
     def absolute(self, value: Node) -> Node:
         """Return `abs(value)`."""

@@ -228,7 +228,7 @@ class Calls(Expressions):
         if name in ("any", "all"):
             values = [
                 self.graph.constant(name == "all"),
-                *(self.checked(node, self.arithmetic.truth, item) for item in values),
+                *(self.checked(node, self.arithmetic.each, self.arithmetic.truth, item) for item in values),
             ]
         if not values:
             self.refuse(node, f"'{name}' of no elements")

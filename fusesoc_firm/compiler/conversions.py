@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-import operator
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain
 
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.kinds import BOOL, FLOAT, INT, Kind, number_of, result_kind
+from fusesoc_firm.compiler.kinds import BOOL, FLOAT, INT, MIXED, Kind, number_of
 
 
 class UnmergeableError(Exception):
@@ -26,6 +27,8 @@ def converted(graph: Graph, value: Node, kind: Kind) -> Node:
     """Return a number converted to another kind, as an operation with this kind converts its operands."""
     if value.kind == kind:
         return value
+    if value.kind == MIXED:
+        return of_each(graph, value, lambda item: converted(graph, item, kind))
     if value.is_constant:
         return graph.constant(number_of(kind, value.payload))
     if kind.is_float:
@@ -54,6 +57,8 @@ def _fixed(graph: Graph, value: Node, kind: Kind) -> Node:
 
 def integer_of(graph: Graph, value: Node) -> Node:
     """Return an integer, a truth value or the units of a fixed-point number as an integer of Python."""
+    if value.kind == MIXED:
+        return of_each(graph, value, lambda item: integer_of(graph, item))
     if value.is_constant:
         return graph.constant(value.low)
     if value.kind == INT:
@@ -79,35 +84,59 @@ def saturated(graph: Graph, units: Node, kind: Kind) -> Node:
     return graph.node(operation, (units,), kind, limits=limits)
 
 
-def common_kind(one: Kind, other: Kind) -> Kind:
-    """Return the kind of a name that has one kind on one path, and another one on another path.
+def chosen(graph: Graph, condition: Node, one: Node, other: Node) -> Node:
+    """Return the number that two paths leave in one place: a mixed one, if no kind has the numbers of both."""
+    if condition.is_constant:
+        return one if condition.payload else other
+    try:
+        kind = _common_kind(one, other)
+    except UnmergeableError:
+        return _mixed(graph, condition, one, other)
+    return graph.choose(condition, converted(graph, one, kind), converted(graph, other, kind))
 
-    Raise `UnmergeableError` for two types of NumPy: operations on the name would have the type of its path in Python.
+
+def _mixed(graph: Graph, condition: Node, one: Node, other: Node) -> Node:
+    """Return the number that one of two paths leaves, with a condition for each kind that it may have."""
+    pair = [
+        {item.kind: (when, item) for when, item in value.alternatives or [(graph.true(), value)]}
+        for value in (one, other)
+    ]
+    found: dict[Kind, tuple[Node, Node]] = {}
+    for kind in sorted({*pair[0], *pair[1]}, key=str):
+        conditions = [side[kind][0] if kind in side else graph.constant(value=False) for side in pair]
+        numbers = [side[kind][1] for side in pair if kind in side]
+        number = graph.choose(condition, *numbers) if len(numbers) > 1 else numbers[0]
+        found[kind] = graph.choose(condition, *conditions), number
+    return graph.node("mixed", chain(*found.values()), MIXED, limits=(0, 0))
+
+
+def of_each(graph: Graph, value: Node, operation: Callable[[Node], Node]) -> Node:
+    """Return the result of an operation on each of the numbers that a mixed one may be."""
+    *others, (_, last) = value.alternatives
+    result = operation(last)
+    for when, item in reversed(others):
+        result = chosen(graph, when, operation(item), result)
+    return result
+
+
+def _common_kind(*values: Node) -> Kind:
+    """Return the kind of a place that has several numbers: a number of Python adopts a type of NumPy.
+
+    Raise `UnmergeableError` if the numbers are not the same in this kind, or have two types of NumPy: operations on
+    them have the type of each number in Python.
     """
-    if one != other and not (one.is_weak or other.is_weak):
-        raise UnmergeableError(f"a {one} and a {other}")
-    return kind_of_both(one, other)
+    items = [item for value in values for _, item in value.alternatives or [(value, value)]]
+    kinds = dict.fromkeys(item.kind for item in items)
+    strong = [kind for kind in kinds if not kind.is_weak]
+    if len(strong) > 1 or (BOOL in kinds and len(kinds) > 1):
+        raise UnmergeableError(" and ".join(f"a {kind}" for kind in kinds))
+    kind = strong[0] if strong else FLOAT if FLOAT in kinds else INT
+    for item in items:
+        _check_exact(item, kind)
+    return kind
 
 
-def kind_of_both(one: Kind, other: Kind) -> Kind:
-    """Return the kind that holds the numbers of two kinds, as that of an operation on both."""
-    if one == other:
-        return one
-    if BOOL in (one, other):
-        raise UnmergeableError(f"a {one} and a {other}")
-    return result_kind(operator.add, one, other)
-
-
-def merged(graph: Graph, value: Node, kind: Kind) -> Node:
-    """Return the number that one path leaves, in the kind that a name has after both.
-
-    Raise `UnmergeableError` if this changes it: Python keeps its own floats and integers as they are.
-    """
-    check_exact(value, kind)
-    return converted(graph, value, kind)
-
-
-def check_exact(value: Node, kind: Kind) -> None:
+def _check_exact(value: Node, kind: Kind) -> None:
     """Raise `UnmergeableError` if a number of Python is not the same number in a type of NumPy."""
     if not value.kind.is_weak or value.kind == kind or kind.is_weak or kind.format:
         return
@@ -125,14 +154,13 @@ def check_exact(value: Node, kind: Kind) -> None:
     raise UnmergeableError(f"a {value.kind} of Python and a {kind}")
 
 
-def widened(first: Node, after: Node, known: Range | None) -> Range:
+def widened(graph: Graph, first: Node, after: Node, known: Range | None) -> Range:
     """Return the range of a number that is `first`, and is replaced by `after` again and again.
 
     `known` is what was expected. Raise `UnmergeableError` if there is no common kind.
     """
-    kind = common_kind(first.kind, after.kind)
-    for value in (first, after):
-        check_exact(value, kind)
+    kind = _common_kind(first, after)
+    first, after = converted(graph, first, kind), converted(graph, after, kind)
     if kind.is_float:
         return Range(kind, (0, 0))
     if kind.format:

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fusesoc_firm.compiler.conversions import integer_of
 from fusesoc_firm.compiler.functions import CONSTANTS, MODULES
 from fusesoc_firm.compiler.graph import LEAVES, Node
-from fusesoc_firm.compiler.kinds import INT, is_number
+from fusesoc_firm.compiler.kinds import INT, MIXED, is_number
 from fusesoc_firm.compiler.names import Names, bound_names
 from fusesoc_firm.compiler.values import (
     Array,
@@ -60,7 +61,7 @@ class Expressions(Names):
             return value.condition
         if not isinstance(value, Node):
             self.refuse(node, f"{described(value)} is not a condition", "compare numbers")
-        return self.checked(node, self.arithmetic.truth, value)
+        return self.checked(node, self.arithmetic.each, self.arithmetic.truth, value)
 
     def expression(self, node: ast.expr) -> Value:
         """Return the value of an expression, by the method with its name."""
@@ -82,7 +83,7 @@ class Expressions(Names):
         if isinstance(node.op, ast.UAdd):
             return value
         operation = self.arithmetic.negative if isinstance(node.op, ast.USub) else self.arithmetic.inverted
-        return self.checked(node, operation, value)
+        return self.checked(node, self.arithmetic.each, operation, value)
 
     def _value_tuple(self, node: ast.Tuple) -> Value:
         return tuple(self._listed(node.elts))
@@ -290,8 +291,10 @@ class Expressions(Names):
 
     def _matches(self, index: Node, count: int, node: ast.AST) -> Iterator[tuple[int, Node]]:
         """Yield each index of a list, with the condition that it is this one; negative ones count from the end."""
-        if index.kind.is_real:
+        if any(kind.is_real for kind in index.kinds):
             self.refuse(node, "an index must be an integer", "convert it with int()")
+        if index.kind == MIXED:
+            index = integer_of(self.graph, index)
         for place in range(count):
             found = self.arithmetic.compare(ast.Eq, index, self.graph.constant(place))
             if index.low < 0:

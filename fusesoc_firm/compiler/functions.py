@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 from fusesoc_firm.compiler.arithmetic import Arithmetic, RefusalError
@@ -17,11 +18,15 @@ _Operation = Callable[..., Node]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of numbers: the operation, which takes an `Arithmetic` first, and the fewest and most numbers."""
+    """A function of numbers: the operation, which takes an `Arithmetic` first, and the fewest and most numbers.
+
+    The result of a choice is one of the numbers.
+    """
 
     make: _Operation
     fewest: int = 1
     most: int = 1
+    is_choice: bool = False
 
 
 def _folded(step: Callable[[Arithmetic, Node, Node], Node]) -> Call:
@@ -32,7 +37,7 @@ def _folded(step: Callable[[Arithmetic, Node, Node], Node]) -> Call:
             result = step(arithmetic, result, item)
         return result
 
-    return Call(run, 2, _ANY)
+    return Call(run, 2, _ANY, is_choice=True)
 
 
 def _modelled(name: str) -> _Operation:
@@ -116,4 +121,5 @@ def called(name: str, arithmetic: Arithmetic, values: list[Node]) -> Node:
     if not call.fewest <= len(values) <= call.most:
         wanted = str(call.fewest) if call.fewest == call.most else f"{call.fewest} or more"
         raise RefusalError(f"'{name}' takes {wanted} numbers in hardware, not {len(values)}")
-    return arithmetic.own(call.make(arithmetic, *values))
+    make = partial(call.make, arithmetic)
+    return arithmetic.own(make(*values) if call.is_choice else arithmetic.each(make, *values))

@@ -14,6 +14,7 @@
 | less, at_most, equal | two numbers of one kind, or integers | a truth value |
 | negate, absolute, copy_sign | floats | by bits |
 | choose | condition, number if true, number if false | the number |
+| mixed | for each kind that the number may have, a condition and a number | the number whose condition holds |
 | and, or, xor, invert | integers or truth values | by bits |
 | shift_left, shift_right | an integer; `payload` bits | the integer |
 | wrap | an integer | the same, in another width |
@@ -30,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from fusesoc_firm.compiler.fixed import Format
-from fusesoc_firm.compiler.kinds import BOOL, INT, Kind, bits_of, kind_of, number_of, units_of
+from fusesoc_firm.compiler.kinds import BOOL, INT, MIXED, Kind, bits_of, kind_of, number_of, units_of
 
 LEAVES = ("constant", "input", "state", "carried", "final")
 """The operations without operands."""
@@ -79,6 +80,17 @@ class Node:
     def is_constant(self) -> bool:
         """Whether the value is known."""
         return self.operation == "constant"
+
+    @property
+    def alternatives(self) -> list[tuple[Node, Node]]:
+        """The condition and the number of each kind that a mixed number may have; others have none."""
+        is_mixed = self.kind == MIXED
+        return [*zip(self.operands[::2], self.operands[1::2], strict=True)] if is_mixed else []
+
+    @property
+    def kinds(self) -> list[Kind]:
+        """The kinds that the number may have."""
+        return [item.kind for _, item in self.alternatives] or [self.kind]
 
     @property
     def code(self) -> int:

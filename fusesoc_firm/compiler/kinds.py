@@ -74,6 +74,9 @@ INTEGERS = {
 }
 KINDS = {kind.name: kind for kind in (BOOL, FLOAT32, FLOAT64, *INTEGERS.values())}
 
+MIXED = Kind("mixed", 64)
+"""The kind of a number that has different types on different paths; it is converted before it is hardware."""
+
 
 def fixed_kind(format_: Format) -> Kind:
     """Return the kind of fixed-point numbers."""

@@ -246,7 +246,7 @@ class _Run:
 
     def _widened(self, path: str, first: Node, value: Node) -> Range:
         try:
-            return widened(first, value, self.states.get(path))
+            return widened(self.graph, first, value, self.states.get(path))
         except UnmergeableError as error:
             self._refuse_state(path, f"is {error}", "give it one type, as int() or numpy.float32() does")
 

@@ -242,7 +242,7 @@ class Repetition(Calls):
                 )
             expected = Range(known.value.kind, (known.value.low, known.value.high)) if known else None
             with self._merging(node):
-                wanted = widened(before, after, expected)
+                wanted = widened(self.graph, before, after, expected)
             if known and wanted == expected:
                 loop.carried[key].next = converted(self.graph, after, known.value.kind)
                 continue

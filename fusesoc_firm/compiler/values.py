@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fusesoc_firm.compiler.conversions import UnmergeableError, common_kind, converted, kind_of_both, merged
+from fusesoc_firm.compiler.conversions import UnmergeableError, chosen
 from fusesoc_firm.compiler.graph import Graph, Node
 
 
@@ -128,37 +128,29 @@ class Merge:
     condition: Node
     memory: Memory
 
-    def value(self, one: Value, other: Value, name: str = "", *, is_field: bool = False) -> Value:
-        """Return the value that a name has after both paths. Raise `UnmergeableError` if there is none.
-
-        The numbers of a message, which become those of its fields, may have different types.
-        """
+    def value(self, one: Value, other: Value, name: str = "") -> Value:
+        """Return the value that a name has after both paths. Raise `UnmergeableError` if there is none."""
         if one is other or (not isinstance(one, Node) and not isinstance(other, Node) and _same(one, other)):
             return one
         if isinstance(one, Node) and isinstance(other, Node):
-            kind = (kind_of_both if is_field else common_kind)(one.kind, other.kind)
-            convert = converted if is_field else merged
-            pair = convert(self.graph, one, kind), convert(self.graph, other, kind)
-            return self.graph.choose(self.condition, *pair)
+            return chosen(self.graph, self.condition, one, other)
         if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
-            return tuple(self.value(*pair, name, is_field=is_field) for pair in zip(one, other, strict=True))
+            return tuple(self.value(*pair, name) for pair in zip(one, other, strict=True))
         if isinstance(one, Unbound) or isinstance(other, Unbound):
             return Unbound(name)
         if (isinstance(one, Array) and isinstance(other, Array)) or (
             isinstance(one, Record) and isinstance(other, Record)
         ):
-            return self._object(one, other, is_field=is_field or isinstance(one, Record))
+            return self._object(one, other)
         return self._maybe(one, other)
 
-    def _object(self, one: Array | Record, other: Array | Record, *, is_field: bool) -> Array | Record:
+    def _object(self, one: Array | Record, other: Array | Record) -> Array | Record:
         contents = self.memory.cells[one], self.memory.cells[other]
         if isinstance(one, Array) and len(contents[0]) != len(contents[1]):
             raise UnmergeableError("a list and another one with another number of elements")
         # A field of one path alone is None on the other one.
         keys = dict.fromkeys((*contents[0], *contents[1]))
-        merged = {
-            key: self.value(contents[0].get(key), contents[1].get(key), str(key), is_field=is_field) for key in keys
-        }
+        merged = {key: self.value(contents[0].get(key), contents[1].get(key), str(key)) for key in keys}
         made: Array | Record = self.memory.new(type(one)(), merged)
         return made
 
@@ -198,7 +190,7 @@ def described(value: Value) -> str:
     """Return words for a value in a message to the user."""
     match value:
         case Node():
-            return f"a {value.kind}"
+            return f"a {' or '.join(map(str, value.kinds))}"
         case None:
             return "None"
         case tuple():

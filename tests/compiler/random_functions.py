@@ -148,6 +148,7 @@ class Random:
             7: f"np.float64({self.integer(depth - 1)})",
             8: f"({one} ** 2)",
             9: f"math.copysign({one}, {other})",
+            10: f"(({self.single(0)} if {self.condition(0)} else {one}) {self.source.choice('+-*')} m.a)",
         }
         return forms.get(draw, f"({one} {self.source.choice('+-*')} {other})")
 
@@ -191,6 +192,7 @@ class Random:
             f"max({one}, {other})",
             f"({one} if {self.condition(depth - 1)} else {other})",
             f"(~{one})",
+            f"(({self.source.choice(['m.k', 'm.w[0]', 'm.q'])} if {self.condition(0)} else {one}) * {other})",
             f"np.int32(m.k + {self.source.randint(0, 3)})",
         ]
         return self.source.choice(forms)
@@ -207,6 +209,7 @@ class Random:
             f"({self.condition(depth - 1)} or {self.condition(0)})",
             f"(not {self.condition(depth - 1)})",
             f"({self.integer(0)} {comparison} m.n)",
+            f"(m.w[1] if {self.condition(0)} else {self.float_(0)}) {comparison} (m.k if m.p else {self.integer(0)})",
             f"(-1.5 < {self.float_(0)} <= 3.0)",
             f"math.isnan({self.float_(0)})",
         ]

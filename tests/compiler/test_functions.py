@@ -117,6 +117,26 @@ def reused(m):
     one, two, three = m.a + m.b, m.a + m.v[0], m.b + m.v[1]
     return {"a": one * two, "b": one * three, "v": [two * three, 0.0, 0.0]}
 """,
+    # Operations have the type that a name has on the path to them.
+    "mixed": """
+import math
+
+
+def mixed(m):
+    k, x, y, t = m.k, m.a, m.i, m.i
+    if m.p:
+        k, x, y = m.i, m.c, m.b
+    elif m.q:
+        x, t = 0.1, m.p
+    n = m.n if m.q else k
+    z = min(m.c, 1.2, m.v[0])
+    if x < z:
+        return {"a": 0.1, "b": m.c, "i": k, "j": 300, "k": n, "d": z, "w": [n, k, *m.w[:2]]}
+    return {
+        "a": x * m.b, "b": x * x, "c": z * m.d, "d": x, "i": k * k, "j": k + m.i, "k": -n, "n": max(n, m.i) << 1,
+        "p": n > k, "q": not x, "v": [math.sqrt(abs(x)), y / 3, z * 0.1], "w": [m.w[k & 3], ~n, t + 3, int(y)],
+    }
+""",
     "state": """
 class State:
     total = 0.0
