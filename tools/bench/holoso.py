@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm import __version__
-from tools.bench.nextpnr import Nextpnr, Placement
+from tools.bench.nextpnr import Nextpnr, Placement, TooLargeError
 from tools.bench.tables import FAILED, NOT_MEASURED, Table, Tell, known_rows
 from tools.bench.yosys import SynthesisError
 
 TITLE = "Beside Holoso"
 OURS = "ours"
+TOO_LARGE = "too large"
 STAGES = ("no stages", "all stages")
 KERNELS = ("pid", "complementary_filter", "inverse_kinematics", "quat2euler_python", "state_kalman")
 
@@ -32,7 +33,8 @@ _NOTE = """The kernels have float64 numbers in both. 'cycles' are those from a s
     time at the measured clock. Holoso has optional stages in its operators, which its users choose by
     trials; here, all of them or none are present. It reorders sums, has neither NaN nor subnormal numbers and computes
     square roots by logarithms, so its results are not those of Python to the bit. Its filter of two states lacks the
-    choice of a period without a measurement."""
+    choice of a period without a measurement. 'too large' is a kernel that needs more multipliers than the 156 of the
+    LFE5U-85, the largest ECP5."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,11 @@ def _placed(made: Mapping[str, str], nextpnr: Nextpnr, tell: Tell, seeds: Sequen
     verilog = "\n".join(path.read_text(encoding="utf-8") for path in sorted(Path(made["folder"]).glob("*.v")))
     try:
         figures = Figures(int(made["cycles"]), nextpnr.place(verilog, made["top"], seeds))
+    except TooLargeError as error:
+        tell(f"{made['kernel']}, Holoso, {made['stages']}: {TOO_LARGE}: {error.cells}")
+        lut = error.cells.lut + error.cells.memory
+        numbers = map(str, (lut, error.cells.ff, error.cells.dsp))
+        return (str(made["cycles"]), TOO_LARGE, "", *numbers, "", made["version"])
     except SynthesisError as error:
         tell(f"{made['kernel']}, Holoso, {made['stages']}: {error}")
         return (*("",) * (len(_COLUMNS) - 3), FAILED)

