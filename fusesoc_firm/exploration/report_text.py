@@ -22,6 +22,7 @@ def _head(report: Report) -> Iterator[str]:
     longest = f", at most {report.longest} with the slowest operands" if report.longest > schedule.latency else ""
     yield cut(f"{schedule.program.name}: {schedule.program.source.name}", WIDTH)
     yield f"latency {_cycles(schedule.latency)}{longest}; interval {_cycles(schedule.interval)}"
+    yield "of the function alone; the latency in 'firm sim' includes converters and stalls"
     for name, cycles in report.elements.items():
         stages = f", in {report.stages[name]} stages" if name in report.stages else ""
         yield cut(f"{_cycles(cycles)} more for each element of '{name}'{stages}", WIDTH)

@@ -51,6 +51,12 @@ def twist(x: float, z: float) -> dict[str, Any]:
             ({"linear_acceleration": {"y": 9.5}, "orientation": {"w": 0.0}}, {"vector": {"y": -9.5}}),
             ["sub linear_acceleration.y=9.5", "pub vector.y=-9.5 vector.x=0.0 vec..."],
         ),
+        # A truth value is none of them.
+        (
+            ("sensor_msgs/BatteryState", "geometry_msgs/Vector3"),
+            ({"voltage": 12.5, "present": False}, {"x": 1.0}),
+            ["sub voltage=12.5 present=False", "pub x=1.0 y=0.0 z=0.0"],
+        ),
         # Of two changed fields, the cut one leaves dots.
         (
             TWIST,

@@ -27,6 +27,7 @@ FOLLOWED = [
     "how-to/explore-an-accelerator.md",
     "how-to/port-a-node-to-hardware.md",
     "how-to/when-it-does-not-work.md",
+    "how-to/when-python-is-not-hardware.md",
     # It builds a bitstream, which takes minutes.
     pytest.param("how-to/onto-an-icebreaker.md", marks=pytest.mark.thorough),
 ]

@@ -163,7 +163,9 @@ def differences(expected: Any, received: Any, name: str = "") -> Iterator[tuple[
 
 
 def is_zero(value: Any) -> bool:
-    """Return whether a value is zero, empty, or contains only such values."""
+    """Return whether a value is zero, empty, or contains only such values; a truth value is always told."""
+    if isinstance(value, bool):
+        return False
     if isinstance(value, dict):
         return all(map(is_zero, value.values()))
     return all(map(is_zero, value)) if isinstance(value, list | bytes) else not value

@@ -11,9 +11,11 @@ from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.written.specification import AXI_STREAM, CHIPS, ETHERNET, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# The default with a link, which stores whole frames. With its header and the adapter's late bytes, such a frame fills a
-# memory of 2,048 bytes.
-_LINK_DEFAULT = 2000
+LINK_DEFAULT = 2000
+"""The default with a link, which stores whole frames.
+
+With its header and the adapter's late bytes, such a frame fills a memory of 2,048 bytes.
+"""
 
 
 def with_longest_payloads(
@@ -41,7 +43,7 @@ def with_longest_sent(
     that fits in a small memory.
     """
     _check_keys(blocks, publishers, faults)
-    least = _LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST
+    least = LINK_DEFAULT if project.interconnect in CHIPS else DEFAULT_LONGEST
     default = max([least, *(item.max_length or 0 for item in subscribers if item.software is None)])
     if project.interconnect == ETHERNET:
         default = LONGEST_SENT_BY_DEFAULT
@@ -84,5 +86,5 @@ def _default(subscriber: Converter, project: Project) -> int:
     if project.interconnect == ETHERNET:
         return LONGEST_IN_FRAME
     if project.interconnect != AXI_STREAM:
-        return _LINK_DEFAULT
+        return LINK_DEFAULT
     return DEFAULT_LONGEST if subscriber.software is None else MOST_BYTES

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.system.derived.longest import LINK_DEFAULT
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
     Connection,
@@ -107,10 +108,16 @@ def default_lengths(system: DerivedSystem) -> list[str]:
     """Return a line for each converter whose longest payload is a default."""
     return [
         f"{item.block}: {item.frame.message} has no bounds and no 'maxLength'; payloads of more than"
-        f" {item.max_length} bytes are refused"
+        f" {item.max_length} bytes are refused{_with_link(system, item)}"
         for item in (*system.subscribers, *system.publishers)
         if item.has_default_length and (system.link or item.software is None)
     ]
+
+
+def _with_link(system: DerivedSystem, converter: Converter) -> str:
+    """Return the default of a subscriber on a board whose host is at a UART or SPI, if the system is on no board."""
+    is_shorter = converter in system.subscribers and (converter.max_length or 0) > LINK_DEFAULT and not system.network
+    return f" (of more than {LINK_DEFAULT} on a board with UART or SPI)" if is_shorter else ""
 
 
 def counts(system: DerivedSystem) -> str:
