@@ -85,6 +85,8 @@ class Arithmetic:
 
     def binary(self, kind: type[ast.operator], one: Node, other: Node) -> Node:
         """Return `one <operator> other`."""
+        if kind not in _OPERATORS:
+            raise RefusalError("'@' is not hardware", "write the sums of products, in loops over 'range'")
         if MIXED in (one.kind, other.kind):
             return self._of_mixed(partial(self.binary, kind), one, other, self._kinds(_OPERATORS[kind], one, other))
         if kind is ast.Pow:
@@ -93,8 +95,6 @@ class Arithmetic:
             return self._folded(kind, one, other)
         if kind in (ast.LShift, ast.RShift):
             return self._shift(kind, one, other)
-        if kind not in _OPERATORS:
-            raise RefusalError("'@' is not hardware", "write the sums of products, in loops over 'range'")
         if kind in _BITWISE:
             return self._bitwise(_BITWISE[kind], one, other, self._result(_OPERATORS[kind], one, other))
         if BOOL in (one.kind, other.kind) and (one.kind == other.kind or kind in (ast.FloorDiv, ast.Mod)):
@@ -119,11 +119,14 @@ class Arithmetic:
         return of_each(self.graph, mixed, of_one)
 
     def _of_mixed(self, operation: Callable[[Node, Node], Node], one: Node, other: Node, kinds: set[Kind]) -> Node:
-        """Return the result of an operation that computes in one of `kinds`, as the path decides."""
-        if len(kinds) > 1:
+        """Return the result of an operation that computes in one of `kinds`, as the path decides.
+
+        If there is only one, the operation is computed once. Truth values may be refused.
+        """
+        if len(kinds) > 1 or self.graph.format or BOOL in (*one.kinds, *other.kinds):
             return self.each(operation, one, other)
-        (kind,) = kinds
-        return operation(self.each(partial(self._to, kind=kind), one), self.each(partial(self._to, kind=kind), other))
+        convert = partial(self._to, kind=min(kinds, key=str))
+        return operation(self.each(convert, one), self.each(convert, other))
 
     def _kinds(self, operation: Callable[..., Any], *operands: Node) -> set[Kind]:
         """Return the kinds that a result may have, as NumPy has it."""

@@ -129,7 +129,8 @@ def number_of(kind: Kind, value: Any) -> Any:
         case Kind(format=Format() as format_):
             return format_.number(value)
         case Kind(is_float=True):
-            return getattr(np, kind.name)(value)
+            with np.errstate(over="ignore"):
+                return getattr(np, kind.name)(value)
     # The integers of hardware wrap.
     return getattr(np, kind.name)((int(value) - kind.limits[0]) % (1 << kind.bits) + kind.limits[0])
 

@@ -76,6 +76,8 @@ BODIES = [
     ("if m.p:\n    x = 1\ny = @x + 1", "'x' has no value on one of the paths", "before the 'if'"),
     ("@if m.p:\n    x = 1\nelse:\n    x = (1, 2)", "two paths leave a int and a tuple of 2", "same type"),
     ("x = m.n if m.p else m.low\ny = @x >> 1", "there is no such operation on a float32 and a int", "int()"),
+    ("x = m.n if m.p else m.low\ny = @x @ x", "'@' is not hardware", "sums of products"),
+    ("x = m.n if m.p else m.p\ny = @x + m.p", "a truth value is not a number here", "int()"),
     ("x = m.n if m.p else m.low\ny = m.v[@x]", "an index must be an integer", "int()"),
     ("x = @min(m.ranges)", "the array 'ranges' may be empty, and then 'min' has no result", "default=math.inf"),
     ("x = min(m.low, 1.0, @default=1.0)", "'min' has no such parameter", "in order"),
