@@ -60,6 +60,8 @@ def _bench(arguments: argparse.Namespace) -> None:
 def _show(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.exploration.fabrics import fabrics
     from fusesoc_firm.exploration.fabrics_text import fabrics_text, map_picture, map_text
+    from fusesoc_firm.exploration.worst_case import worst_times
+    from fusesoc_firm.exploration.worst_case_text import worst_times_text
     from fusesoc_firm.system.hardware.exchange import described
     from fusesoc_firm.system.views.inner_topics import topics_description, ways_of_topics
     from fusesoc_firm.system.written.specification import WIRED, WIRES
@@ -69,7 +71,7 @@ def _show(arguments: argparse.Namespace) -> None:
     loaded = load(arguments)
     exchange = loaded.system.exchange
     written = str(loaded.specification.project.fabric)
-    found = fabrics(loaded)
+    found, times = fabrics(loaded), worst_times(loaded)
     if arguments.map:
         if not exchange:
             fail("--map draws the routers of an exchange", hint="add 'fabric: crossbar' or another one to 'project'")
@@ -77,13 +79,16 @@ def _show(arguments: argparse.Namespace) -> None:
     chosen = WIRES if written in WIRED or not exchange else written
     if arguments.json:
         ways = [item.data() for item in found]
-        print_json({"fabric": chosen, "ways": ways, **topics_description(loaded.system)})
+        worst = [item.data() for item in times]
+        print_json({"fabric": chosen, "ways": ways, "worstCase": worst, **topics_description(loaded.system)})
         return
     for line in ways_of_topics(loaded.system) or ["no topic is within the FPGA"]:
         print(line)
     if len(found) > 1:
         print(f"\nways, estimated for an ECP5, with streams of {loaded.system.width} bits; *: the specification's")
         print("\n".join(fabrics_text(found, chosen)))
+    if loaded.system.inner_topics:
+        print("\n".join(worst_times_text(times)))
     if exchange:
         print(f"\n{described(exchange)}")
         print("\n".join(map_text(exchange)))

@@ -124,10 +124,17 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
 
 
 def _choose_scheduler(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.exploration.worst_case import worst_times
+    from fusesoc_firm.exploration.worst_case_text import worst_times_text
     from fusesoc_firm.scheduling.analysis import Criterion, choose
     from fusesoc_firm.scheduling.choice import show
     from fusesoc_firm.system.derived.timing import channel_of, tasks_of
 
-    system = load(arguments).system
+    loaded = load(arguments)
+    system = loaded.system
     choice = choose(tasks_of(system), Criterion(arguments.criterion), channel_of(system))
-    print(show(choice, arguments.format), end="")
+    responses = {item.task.name: item.response for item in choice.best.bounds if item.response is not None}
+    times = worst_times(loaded, responses)
+    print(show(choice, arguments.format, {"worstCase": [item.data() for item in times]}), end="")
+    if arguments.format == "text":
+        print("\n".join(worst_times_text(times)))

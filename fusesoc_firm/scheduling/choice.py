@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from fusesoc_firm.scheduling.analysis import Analysis, Choice, end_of
@@ -10,11 +11,11 @@ from fusesoc_firm.text.json_text import json_text
 from fusesoc_firm.text.yaml_text import yaml_dump
 
 
-def show(choice: Choice, form: str) -> str:
-    """Return the choice as "text", "yaml" or "json", with a final newline."""
+def show(choice: Choice, form: str, more: Mapping[str, Any]) -> str:
+    """Return the choice as "text", "yaml" or "json", with a final newline; data also has `more` keys."""
     if form == "text":
         return _text(choice)
-    data = as_data(choice)
+    data = {**as_data(choice), **more}
     if form == "json":
         return json_text(data, 1) + "\n"
     return yaml_dump(data)

@@ -167,6 +167,7 @@ class _Resolver:
     def resolve_accelerators(self) -> None:
         for accelerator in self.specification.accelerators:
             self._check_sources(accelerator)
+            self._check_pace(accelerator)
             self._check_compiled(accelerator)
             inputs = self._sides("in", accelerator.interface.input)
             outputs = self._sides("out", accelerator.interface.output)
@@ -201,9 +202,20 @@ class _Resolver:
             message = f"'standard' is legal only for VHDL, but '{accelerator.name}' has the type {accelerator.type}"
             self.faults.error(message, accelerator.place("standard"), "remove the key")
 
+    def _check_pace(self, accelerator: Accelerator) -> None:
+        """Note promised cycles of software, and negative ones."""
+        for key in ("latency", "interval"):
+            cycles = getattr(accelerator, key)
+            if cycles is not None and accelerator.is_software:
+                message = f"'{key}' has no effect: '{accelerator.name}' is software"
+                self.faults.error(message, accelerator.place(key), "remove the key")
+            elif cycles is not None and cycles < 0:
+                message = f"'{key}' of '{accelerator.name}' cannot be {cycles}"
+                self.faults.error(message, accelerator.place(key), "legal here: 0 or more cycles")
+
     def _check_compiled(self, accelerator: Accelerator) -> None:
         """Note keys of compiled functions at an accelerator in another language, and illegal numbers of operators."""
-        for key in ("numbers", "resources", "latency", "interval", "element"):
+        for key in ("numbers", "resources", "element"):
             if key in accelerator.places and accelerator.type and not accelerator.is_compiled:
                 message = f"'{key}' is legal only for Python, but '{accelerator.name}' has the type {accelerator.type}"
                 self.faults.error(message, accelerator.place(key), "remove the key")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import LENGTH_BYTES
-from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
+from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES, Order
 from fusesoc_firm.scheduling.tasks import Task
 from fusesoc_firm.system.derived.groups import groups_of
 from fusesoc_firm.system.derived.ids import ONE_BYTE
@@ -119,6 +119,26 @@ def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
     from fusesoc_firm.scheduling.analysis import analyse
 
     return analyse(system.scheduling.policy, tasks, channel_of(system), is_ordered=True).bounds
+
+
+def responses_of(system: DerivedSystem) -> dict[str, int]:
+    """Return the bounds on the cycles from a publisher's request to the last beat of its frame, as far as they exist.
+
+    Policies that take turns, and a single publisher, need no periods.
+    """
+    known = {item.task.name: item.response for item in bounds_of(system) if item.response is not None}
+    times = [item.transfer_time for item in system.scheduling.times]
+    policy = system.scheduling.policy
+    if known or system.tree or system.scheduling.groups or None in times:
+        return known
+    if POLICIES[policy].order is not Order.TURNS and len(times) > 1:
+        return {}
+    from fusesoc_firm.scheduling.analysis import overheads_of
+    from fusesoc_firm.scheduling.response import taking_turns
+
+    tasks = [Task(item.block, time, time, time) for item, time in zip(system.publishers, times, strict=True) if time]
+    overheads = overheads_of(policy, len(tasks), system.scheduling.shortest_run)
+    return {task.name: taking_turns(task, [other for other in tasks if other is not task], overheads) for task in tasks}
 
 
 def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:

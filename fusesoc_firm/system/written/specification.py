@@ -365,10 +365,14 @@ class Accelerator(Section):
         "the operators of an accelerator in Python", form="section", section=Resources, is_asked=False
     )
     latency: int | None = key(
-        "the most cycles from a message to the answer of an accelerator in Python", form="integer", is_asked=False
+        "the most cycles from a message to the answer: a limit for Python, else a promise for the worst case",
+        form="integer",
+        is_asked=False,
     )
     interval: int | None = key(
-        "the most cycles between two messages of an accelerator in Python", form="integer", is_asked=False
+        "the most cycles between two messages, in the same way; without it, each is held until its answer is taken",
+        form="integer",
+        is_asked=False,
     )
     element: int | None = key(
         "the most cycles for each element of an array in an accelerator in Python", form="integer", is_asked=False
