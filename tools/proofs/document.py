@@ -30,6 +30,8 @@ _SHORT = {
     "SAMPLES": "S",
     "PORTS": "P",
 }
+# Those of messages that become frames.
+_OF_MESSAGES = {"FIELD_BITS": "B", "COPIES": "C"}
 # Generics whose bits are counted.
 _COUNTED = {"TURNS": "T", "COPIES": "C"}
 # Generics that a table says if they are true.
@@ -75,6 +77,8 @@ def _sizes(proof: Proof) -> str:
 def _words(size: Size) -> Iterator[str]:
     # A tree has no subscribers in its proof.
     short = _SHORT if "SUBSCRIBERS" in size else {**_SHORT, "PUBLISHERS": "N"}
+    if "WIDTH" in size:
+        short |= _OF_MESSAGES
     for name, value in size.items():
         if name in short:
             yield f"{short[name]}={value}"

@@ -97,6 +97,53 @@ _MERGED = Proof(
     is_bounded=True,
 )
 
+_SEND = "firm_message_send.vhd"
+_SENT_MESSAGES = Proof(
+    "message_send",
+    "firm_message_send",
+    ("axis/package", "axis/axis"),
+    sizes=tuple(
+        {"WIDTH": 8, "FIELD_BITS": bits, "COPIES": copies}
+        for bits, copies in ((20, 2), (20, 1), (5, 3), (8, 1), (40, 3))
+    ),
+    depth=3,
+    mutations=(
+        Mutation(_SEND, "advances <= not valid_r or m_axis_tready;", "advances <= '1';", ("beat_stays",)),
+        Mutation(_SEND, "loads    <= not valid_r or ends_r;", "loads <= not valid_r or last_r;", ("copies_in_order",)),
+        Mutation(_SEND, "ready         <= advances and loads;", "ready <= loads;", ("takes_the_next_at_its_end",)),
+        Mutation(
+            _SEND,
+            "message_r(LANES-1 downto 0) & message_r(BITS-1 downto LANES)",
+            "message_r(BITS-LANES-1 downto 0) & message_r(BITS-1 downto BITS-LANES)",
+            ("beats_in_order",),
+        ),
+        Mutation(_SEND, "FIELD_BITS) <= (others => '0');", "FIELD_BITS) <= (others => '1');", ("beats_in_order",)),
+        Mutation(_SEND, "last_r     <= bit_of(position_r = max(0, BEATS-2));", "last_r <= '0';", ("last_is_marked",)),
+        Mutation(_SEND, "valid_r    <= valid;", "valid_r <= valid and not ends_r;", ("offered_without_a_gap",)),
+    ),
+)
+
+_RECEIVE = "firm_message_receive.vhd"
+_RECEIVED_MESSAGES = Proof(
+    "message_receive",
+    "firm_message_receive",
+    ("axis/package", "axis/axis"),
+    sizes=tuple({"WIDTH": 8, "FIELD_BITS": bits} for bits in (20, 5, 8, 40)),
+    depth=3,
+    mutations=(
+        Mutation(_RECEIVE, "has_room      <= ready or not valid_r;", "has_room <= '1';", ("message_stays",)),
+        Mutation(
+            _RECEIVE,
+            "valid_r <= s_axis_tvalid and s_axis_tlast;",
+            "valid_r <= s_axis_tvalid;",
+            ("offered_when_complete",),
+        ),
+        Mutation(_RECEIVE, "s_axis_tready <= has_room;", "s_axis_tready <= not valid_r;", ("room_when_taken",)),
+        Mutation(_RECEIVE, "if s_axis_tvalid = '1' then", "if s_axis_tlast = '1' then", ("fields_are_those_sent",)),
+        Mutation(_RECEIVE, "s_axis_tdata & message_r;", "message_r & s_axis_tdata;", ("fields_are_those_sent",)),
+    ),
+)
+
 _MESSAGES = "firm_message_queue.vhd"
 
 
@@ -444,6 +491,8 @@ _READ = Proof(
 PROOFS = (
     _QUEUED,
     _MERGED,
+    _SENT_MESSAGES,
+    _RECEIVED_MESSAGES,
     _QUEUED_MESSAGES,
     _WATCHED,
     _WATCHED_SINK,
