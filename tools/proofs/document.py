@@ -78,7 +78,7 @@ def _words(size: Size) -> Iterator[str]:
     # A tree has no subscribers in its proof.
     short = _SHORT if "SUBSCRIBERS" in size else {**_SHORT, "PUBLISHERS": "N"}
     if "WIDTH" in size:
-        short |= _OF_MESSAGES
+        short = {**short, **_OF_MESSAGES}
     for name, value in size.items():
         if name in short:
             yield f"{short[name]}={value}"
