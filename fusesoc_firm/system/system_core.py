@@ -69,8 +69,8 @@ from fusesoc_firm.system.hardware.status import (
     REGISTERS_TEMPLATE,
     Identity,
     address_bits,
+    features_of,
     identity_of,
-    parts_of,
     status_description,
     status_entity,
 )
@@ -313,7 +313,7 @@ def status_text(loaded: LoadedSystem) -> str:
     system = loaded.system
     shape = len(system.subscribers), len(system.publishers)
     digest = identity(loaded).digest
-    return status_description(system.name, *shape, digest, parts_of(system))
+    return status_description(system.name, *shape, digest, features_of(system))
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.system.hardware.registers import Kind, Register, registers_configuration
-from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, Part, status_map
+from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, Features, Part, status_map
 from fusesoc_firm.text.render import render
 from tests.hdl.ghdl import Library, core_files
 from tests.recall import RunResult
@@ -16,7 +16,7 @@ from tests.recall import RunResult
 BENCH = "status_bench"
 DIGEST = "0123456789abcdef" * 2
 SIGNATURES = ("deadbeef", "00c0ffee", "12345678")
-MAP = status_map("bench", 2, 1, DIGEST, Part.TIME_STAMPS)
+MAP = status_map("bench", 2, 1, DIGEST, Features(Part.TIME_STAMPS))
 # The registers that change by themselves.
 RESTING = [register for register in MAP.registers if register.name != "cycles"]
 COUNT_BITS = 4

@@ -14,13 +14,13 @@ from fusesoc_firm.node.status.status import read_status, read_word, status_text,
 from fusesoc_firm.node.status.status_socket import open_status
 from fusesoc_firm.node.transport import udp
 from fusesoc_firm.node.transport.transport import TransportError
-from fusesoc_firm.system.hardware.status import Part, network_words, status_map
+from fusesoc_firm.system.hardware.status import Features, Part, network_words, status_map
 from fusesoc_firm.system.status_frames import answered, read_request
 from tests.seeds import seeded
 
 SEED = seeded(20261127)
 WRITE = 1 << 31
-MAP = {register.address: register for register in status_map("board", 1, 1, parts=Part.NETWORK).registers}
+MAP = {register.address: register for register in status_map("board", 1, 1, features=Features(Part.NETWORK)).registers}
 COUNTED = {"network_broken_frames": 7, "subscriber[0].frames": 3}
 
 

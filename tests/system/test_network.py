@@ -12,7 +12,7 @@ from fusesoc_firm.builds.call.generators import GENERATORS
 from fusesoc_firm.cli import main
 from fusesoc_firm.core.request import Request
 from fusesoc_firm.system.boards.board import read_board
-from fusesoc_firm.system.hardware.status import Part, network_words, status_map
+from fusesoc_firm.system.hardware.status import Features, Part, network_words, status_map
 from fusesoc_firm.text.diagnostics import InputError
 from tests.hdl.ghdl import REPOSITORY
 
@@ -163,7 +163,9 @@ def test_its_status_counts_the_faults_of_its_network(path: Path) -> None:
 
 def test_the_faults_of_the_network_are_told_in_the_same_words() -> None:
     """In the table of the page, and at the port of the core."""
-    addresses = {item.name: item.address for item in status_map("board", 1, 1, parts=Part.NETWORK).registers}
+    addresses = {
+        item.name: item.address for item in status_map("board", 1, 1, features=Features(Part.NETWORK)).registers
+    }
     page = (REPOSITORY / "docs" / "reference" / "status.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| 0x(\w+) \| `(network_\w+)` \| (.+) \|$", page, re.MULTILINE)
     assert [(int(address, 16), name, meaning) for address, name, meaning in rows] == [

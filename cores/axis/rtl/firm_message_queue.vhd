@@ -26,7 +26,9 @@ entity firm_message_queue is
 
     sink_fields : out std_logic_vector(FIELD_BITS-1 downto 0);
     sink_valid  : out std_logic;
-    sink_ready  : in  std_logic
+    sink_ready  : in  std_logic;
+
+    dropped : out std_logic  -- a message in each such cycle
   );
 end entity firm_message_queue;
 
@@ -94,6 +96,8 @@ begin
   reads    <= may_load and is_stored;
   writes   <= enters and not (may_load and not is_stored);
   drops_i  <= writes and is_full and not reads when DROP_OLDEST else '0';
+
+  dropped <= (source_valid and is_full) when DROP_NEWEST else drops_i;
 
   sink_fields <= fields_r;
   sink_valid  <= valid_r;

@@ -20,7 +20,17 @@ from fusesoc_firm.frame.model import ID_BYTES
 from fusesoc_firm.node.status.status_exchange import NO_ANSWER
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 from fusesoc_firm.system.hardware.registers import Register
-from fusesoc_firm.system.hardware.status import DIGEST_ADDRESS, DIGEST_WORDS, Part, network_words, status_map
+from fusesoc_firm.system.hardware.status import (
+    DIGEST_ADDRESS,
+    DIGEST_WORDS,
+    ENDPOINT_WORDS,
+    ENDPOINTS_ADDRESS,
+    Features,
+    Part,
+    endpoint_register,
+    network_words,
+    status_map,
+)
 from fusesoc_firm.system.status_frames import answered, read_request, write_request
 
 # A simulator may have to start first, on a busy machine.
@@ -102,7 +112,8 @@ def status_registers(read: Callable[[int], int]) -> tuple[Register, ...]:
     if magic != _MAGIC or shape >> 24 != _VERSION:
         raise TransportError(f"the hardware has another kind of status: it begins with {magic:08x} {shape:08x}")
     parts = Part(read(_FEATURES_ADDRESS) & _KNOWN_PARTS)
-    return status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, parts=parts).registers
+    endpoints = read(ENDPOINTS_ADDRESS) if Part.EXCHANGE in parts else 0
+    return status_map("system", shape & 0xFFF, shape >> 12 & 0xFFF, features=Features(parts, endpoints)).registers
 
 
 class StatusWatch:
@@ -180,6 +191,7 @@ def status_text(status: Status, names: Sequence[str] = ()) -> str:
             f"{name:{width}}  {words['signature']:08x}  {words['frames']:9}  {words['longest_wait']:6} cycles{stamp}"
             f"  {faults}"
         )
+    lines += _endpoints(status)
     counted = sorted({fault for channel in channels for fault in _counts(status, channel)})
     return "\n".join(lines + [f"code {fault.value}: {fault.text}" for fault in counted])
 
@@ -211,6 +223,13 @@ def _network(status: Status) -> list[str]:
     counts = {text: status.words[name] for name, text in network_words().items() if name in status.words}
     counted = [f"network: {count} times {text}" for text, count in counts.items() if count]
     return counted or ["network: no faults"] * bool(counts)
+
+
+def _endpoints(status: Status) -> Iterator[str]:
+    """Yield a line for each endpoint of an exchange."""
+    for number in range(status.words.get("exchange", 0)):
+        counts = [f"{word} {status.words[endpoint_register(number, word)]}" for word in ENDPOINT_WORDS]
+        yield f"endpoint {number}: {', '.join(counts)}"
 
 
 def check_digest(transport: Transport, expected: str, system: str, id_bytes: int = ID_BYTES) -> None:

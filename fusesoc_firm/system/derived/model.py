@@ -290,6 +290,11 @@ class Junction:
         return self.outputs[0]
 
     @property
+    def drops(self) -> bool:
+        """Whether it is a queue that drops messages."""
+        return self.depth > 0 and self.overflow is not Overflow.BLOCK
+
+    @property
     def is_exchanged(self) -> bool:
         """Whether the messages pass the exchange."""
         return self.readers > 0

@@ -53,7 +53,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         "entity": watched_entity(system) if is_watched else system.entity,
         "name": system.name,
         **interconnect_configuration(system),
-        **status_configuration(system),
+        **status_configuration(system, names),
         **scheduler_configuration(system),
         "has_watchdog": system.watchdog > 0,
         "clocks": _clocks(system),

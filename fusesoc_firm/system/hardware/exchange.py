@@ -16,7 +16,15 @@ from fusesoc_firm.converter.vhdl import bit, bits, index_bits
 from fusesoc_firm.system.derived.exchange import field_bits
 from fusesoc_firm.system.derived.model import DerivedSystem, End, Exchange, Junction
 from fusesoc_firm.system.hardware.maps import instance
-from fusesoc_firm.system.hardware.names import EXCHANGE, EXCHANGE_WORDS, OWN_RESET, Names
+from fusesoc_firm.system.hardware.names import (
+    DROPPED,
+    EXCHANGE,
+    EXCHANGE_EVENTS,
+    EXCHANGE_WORDS,
+    OWN_RESET,
+    Names,
+    is_counted,
+)
 from fusesoc_firm.text.render import Context
 
 EXCHANGE_TEMPLATE = "vhdl/system_exchange.vhd"
@@ -88,20 +96,35 @@ def exchange_instance(names: Names, system: DerivedSystem) -> list[Context]:
         pairs += [(port, part) for part, port in _fields(names, word, signals["sink_fields"]) if port != _UNUSED]
         pairs.append((bit(names.at(word.side, "segment_valid"), 0), bit(signals["sink_valid"], word.number)))
         pairs.append((bit(signals["sink_ready"], word.number), names.at(word.side, "msg_ready")))
+    events = EXCHANGE_EVENTS if system.status else ()
+    signals |= {word: names.exchange(word) for word in events}
+    sizes |= dict.fromkeys(events, len(system.exchange.ends))
+    pairs += [] if not events else [(bit(signals["dropped"], end), source) for end, source in _dropped(names, system)]
+    ports = [(word, signal) for word, signal in signals.items() if word != "dropped"]
     topics = dict.fromkeys(word.junction.topic for word in words.sources)
     return [
         {
             "block": "the exchange",
             "message": f"topics in the exchange: {', '.join(topics)}",
-            "signals": [{"name": signals[word], "bits": sizes[word]} for word in EXCHANGE_WORDS],
+            "signals": [{"name": signals[word], "bits": sizes[word]} for word in sizes],
             "assignments": [{"target": target, "source": source} for target, source in pairs],
             **instance(
                 names.label(*EXCHANGE),
                 f"entity work.{exchange_entity(system)}",
-                [("clk", "clk"), ("rst_n", OWN_RESET), *signals.items()],
+                [("clk", "clk"), ("rst_n", OWN_RESET), *ports],
             ),
         }
     ]
+
+
+def _dropped(names: Names, system: DerivedSystem) -> Iterator[tuple[int, str]]:
+    """Yield for each endpoint the signal that its reader's queue drops a message, if it does."""
+    assert system.exchange
+    sinks = {item.source: item.sinks for item in system.connections}
+    queues = {item.block: item for item in system.junctions if is_counted(item, system)}
+    for number, end in enumerate(system.exchange.ends):
+        after = [queues[sink.block] for sink in (sinks.get(end.sink, ()) if end.sink else ()) if sink.block in queues]
+        yield number, bit(names.joined(after[0], DROPPED), 0) if after else _UNUSED
 
 
 def _fields(names: Names, word: _Word, signal: str) -> Iterator[tuple[str, str]]:
@@ -151,6 +174,7 @@ class _Unit:
             "sink_bits": words.sinks[-1].high + 1,
             "sink_count": len(words.sinks),
             "end_count": count,
+            "is_counted": bool(self.system.status),
             "data_bits": count * width,
             "keep_bits": count * width // 8,
             "has_destinations": self._dest_bits > 0,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Any
 
 from fusesoc_firm.converter.vhdl import bit, bits
 from fusesoc_firm.system.derived.model import DerivedSystem, Junction, Overflow
 from fusesoc_firm.system.derived.sides import SidePort, handshakes
 from fusesoc_firm.system.hardware.maps import instance
-from fusesoc_firm.system.hardware.names import OWN_RESET, Names, given_ports
+from fusesoc_firm.system.hardware.names import DROPPED, OWN_RESET, Names, given_ports, is_counted
 
 _CLOCK = (("clk", "clk"), ("rst_n", OWN_RESET))
 # The level of a message without fields.
@@ -20,7 +21,7 @@ _READY, _SEGMENTS = "msg_ready", "segment_valid"
 def junction_configuration(names: Names, junction: Junction, system: DerivedSystem) -> dict[str, Any]:
     """Return a merge or a queue, with its signals and the assignments between these and its ports."""
     ports = _Ports(given_ports(junction, system.width), junction)
-    make = _merge if junction.sources > 1 else _queue
+    make = _merge if junction.sources > 1 else partial(_queue, has_events=is_counted(junction, system))
     topic = f" of topic {junction.topic}" if junction.topic else ""
     return {"block": junction.block, "message": f"{junction.frame.message}{topic}", **make(names, junction, ports)}
 
@@ -72,7 +73,7 @@ def _merge(names: Names, junction: Junction, ports: _Ports) -> dict[str, Any]:
     }
 
 
-def _queue(names: Names, junction: Junction, ports: _Ports) -> dict[str, Any]:
+def _queue(names: Names, junction: Junction, ports: _Ports, *, has_events: bool) -> dict[str, Any]:
     (given,), taken = junction.inputs, junction.output
     size = max(1, _bits(ports.fields))
     source, sink = (names.joined(junction, f"{side}_fields") for side in ("source", "sink"))
@@ -91,13 +92,17 @@ def _queue(names: Names, junction: Junction, ports: _Ports) -> dict[str, Any]:
             (f"{side}_valid", bit(names.port(junction.block, f"{prefix}{_SEGMENTS}"), 0)),
             (f"{side}_ready", names.port(junction.block, f"{prefix}{_READY}")),
         ]
+    events = [names.joined(junction, DROPPED)] if has_events else []
     return {
-        "signals": [{"name": source, "bits": size}, {"name": sink, "bits": size}],
+        "signals": [
+            *({"name": name, "bits": size} for name in (source, sink)),
+            *({"name": name, "bits": 1} for name in events),
+        ],
         "assignments": [{"target": target, "source": value} for target, value in pairs],
         **instance(
             names.label(junction.block),
             "entity firm.firm_message_queue",
-            [*_CLOCK, *levels],
+            [*_CLOCK, *levels, *((DROPPED, bit(name, 0)) for name in events)],
             [("FIELD_BITS", size), ("MESSAGES", junction.depth), *drop],
         ),
     }

@@ -49,11 +49,19 @@ ERROR_WORDS = ("error", "error_code")
 # The levels and data of all sources of a merge, and those of its sink.
 MERGE_WORDS = tuple(f"{side}_{word}" for side in ("source", "sink") for word in ("fields", "offers", "takes"))
 QUEUE_WORDS = ("source_fields", "sink_fields")
+DROPPED = "dropped"
 # The exchange, with the messages of all publishers and readers.
 EXCHANGE = ("", "exchange")
 EXCHANGE_WORDS = tuple(f"{side}_{word}" for side in ("source", "sink") for word in ("fields", "valid", "ready"))
+# What a status counts at the endpoints of the exchange.
+EXCHANGE_EVENTS = ("sent", "stalled", "received", "waited", DROPPED)
 # Between a publisher and the FIFO for late frames.
 LATE_WORDS = (*AXIS, "tuser")
+
+
+def is_counted(junction: Junction, system: DerivedSystem) -> bool:
+    """Return whether a status counts the messages that a queue drops."""
+    return junction.drops and bool(system.status and system.exchange)
 
 
 @cache
@@ -177,9 +185,12 @@ def _signals(system: DerivedSystem) -> Iterator[_Key]:
             yield from ((item.block, "", f"late_{word}") for word in LATE_WORDS)
     for junction in system.junctions:
         words = () if junction.is_exchanged else MERGE_WORDS if junction.sources > 1 else QUEUE_WORDS
+        if is_counted(junction, system):
+            words = (*words, DROPPED)
         yield from ((junction.block, "", f"all_{word}") for word in words)
     if system.exchange:
-        yield from ((*EXCHANGE, word) for word in EXCHANGE_WORDS)
+        events = EXCHANGE_EVENTS if system.status else ()
+        yield from ((*EXCHANGE, word) for word in (*EXCHANGE_WORDS, *events))
     yield from ((block.block, str(pin.name), "synced") for block, pin in synchronised_pins(system))
     yield from (_length_key(item.source) for item in system.connections if is_found_out(item))
     for crossing in all_crossings(system):

@@ -7,12 +7,14 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Flag
+from typing import NamedTuple
 
 from fusesoc_firm.converter.vhdl import index_bits
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, StatusAccess
 from fusesoc_firm.system.derived.status import TREE_CHANNELS
 from fusesoc_firm.system.hardware.instances import ERROR_CODE_BITS, INNER, error_of
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS
+from fusesoc_firm.system.hardware.names import Names
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map
 from fusesoc_firm.text.render import Context, render
 
@@ -21,6 +23,9 @@ REGISTERS_TEMPLATE = "vhdl/registers.vhd"
 
 DIGEST_ADDRESS, DIGEST_WORDS = 0x30, 4
 _NETWORK_ADDRESS = 0x40
+# The number of endpoints of an exchange, and their counters.
+ENDPOINTS_ADDRESS = 0x2C
+_EXCHANGE_ADDRESS, _ENDPOINT_BYTES = 0x400, 0x20
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
 
@@ -37,9 +42,26 @@ class Part(Flag):
 
     TIME_STAMPS = 1
     NETWORK = 2
+    EXCHANGE = 4
 
 
-NO_PART = Part(0)
+class Features(NamedTuple):
+    """The optional parts of a status, with the number of endpoints of an exchange."""
+
+    parts: Part = Part(0)
+    endpoints: int = 0
+
+
+NO_FEATURES = Features()
+
+# What is counted at each endpoint of an exchange, by the signal with a bit for each endpoint.
+ENDPOINT_WORDS = {
+    "sent": "Frames of the publisher that have entered",
+    "stalled": "Cycles that a beat of the publisher waited",
+    "received": "Frames that the reader has taken",
+    "waited": "Cycles that a beat waited for the reader",
+    "dropped": "Messages that the reader's queue has dropped",
+}
 
 
 @dataclass(frozen=True)
@@ -74,7 +96,9 @@ def _described(item: Converter) -> list[object]:
     return [item.id, item.block, item.name, item.frame.ros.title, str(item.frame.message)]
 
 
-def status_description(name: str, subscribers: int, publishers: int, digest: str = "", parts: Part = NO_PART) -> str:
+def status_description(
+    name: str, subscribers: int, publishers: int, digest: str = "", features: Features = NO_FEATURES
+) -> str:
     """Return the description of a status in SystemRDL; without a `digest`, its registers have the value 0."""
     digits = digest or "0" * (DIGEST_WORDS * _WORD_DIGITS)
     return render(
@@ -83,7 +107,7 @@ def status_description(name: str, subscribers: int, publishers: int, digest: str
             "name": name,
             "subscribers": subscribers,
             "publishers": publishers,
-            "time_stamps": Part.TIME_STAMPS in parts,
+            "time_stamps": Part.TIME_STAMPS in features.parts,
             "network": [
                 {
                     "register": _network_register(name),
@@ -92,8 +116,18 @@ def status_description(name: str, subscribers: int, publishers: int, digest: str
                 }
                 for number, (name, meaning) in enumerate(NETWORK_FAULTS.items())
             ]
-            if Part.NETWORK in parts
+            if Part.NETWORK in features.parts
             else [],
+            "exchange": {"endpoints": features.endpoints} if features.endpoints else None,
+            "endpoints": [
+                {
+                    "register": endpoint_register(number, word),
+                    "title": f"{meaning}, endpoint {number}",
+                    "address": f"{_EXCHANGE_ADDRESS + number * _ENDPOINT_BYTES + 4 * place:03x}",
+                }
+                for number in range(features.endpoints)
+                for place, (word, meaning) in enumerate(ENDPOINT_WORDS.items())
+            ],
             "publisher_address": f"{_CHANNELS_ADDRESS + subscribers * _CHANNEL_BYTES:x}",
             "digest": [
                 {
@@ -108,15 +142,27 @@ def status_description(name: str, subscribers: int, publishers: int, digest: str
     )
 
 
-def status_map(name: str, subscribers: int, publishers: int, digest: str = "", parts: Part = NO_PART) -> RegisterMap:
+def status_map(
+    name: str, subscribers: int, publishers: int, digest: str = "", features: Features = NO_FEATURES
+) -> RegisterMap:
     """Return the registers of a status."""
-    return register_map(status_description(name, subscribers, publishers, digest, parts))
+    return register_map(status_description(name, subscribers, publishers, digest, features))
 
 
-def parts_of(system: DerivedSystem) -> Part:
-    """Return the parts of the status of a system."""
-    wanted = {Part.TIME_STAMPS: system.has_time_stamps, Part.NETWORK: bool(system.network)}
-    return Part(sum(part.value for part, is_wanted in wanted.items() if is_wanted))
+def endpoint_register(number: int, word: str) -> str:
+    """Return the name of a counter of an endpoint of the exchange."""
+    return f"endpoint{number}_{word}"
+
+
+def features_of(system: DerivedSystem) -> Features:
+    """Return the features of the status of a system."""
+    wanted = {
+        Part.TIME_STAMPS: system.has_time_stamps,
+        Part.NETWORK: bool(system.network),
+        Part.EXCHANGE: bool(system.exchange),
+    }
+    parts = Part(sum(part.value for part, is_wanted in wanted.items() if is_wanted))
+    return Features(parts, len(system.exchange.ends) if system.exchange else 0)
 
 
 def network_words() -> dict[str, str]:
@@ -133,7 +179,7 @@ def status_entity(system: DerivedSystem) -> str:
     return f"{system.name}_status"
 
 
-def status_configuration(system: DerivedSystem) -> Context:
+def status_configuration(system: DerivedSystem, names: Names) -> Context:
     """Return the connection of the status to the top level, and the resulting changes there."""
     return {
         "scope": INNER if system.status else "",
@@ -142,7 +188,7 @@ def status_configuration(system: DerivedSystem) -> Context:
         "manager_tid": _manager_tid(system),
         "has_status": bool(system.status),
         "status_bus": system.status is StatusAccess.AXI_LITE,
-        "status": _instances(system) if system.status else None,
+        "status": _instances(system, names) if system.status else None,
     }
 
 
@@ -163,7 +209,7 @@ def _has_inner_streams(system: DerivedSystem) -> bool:
     return system.status is StatusAccess.FRAMES or bool(system.status and system.tree)
 
 
-def _instances(system: DerivedSystem) -> Context:
+def _instances(system: DerivedSystem, names: Names) -> Context:
     channels = (*system.subscribers, *system.publishers)
     return {
         "tree": bool(system.tree),
@@ -181,6 +227,11 @@ def _instances(system: DerivedSystem) -> Context:
         "network_faults": [{"register": name, "bit": bit} for bit, name in enumerate(network_words())]
         if system.network
         else [],
+        "events": [
+            {"register": endpoint_register(number, word), "signal": names.exchange(word), "bit": number}
+            for number in range(len(system.exchange.ends) if system.exchange else 0)
+            for word in ENDPOINT_WORDS
+        ],
         "time_stamps": system.has_time_stamps,
         "host_tid": "open" if system.link or system.network else "m_axis_tid",
         "width": system.width,

@@ -14,6 +14,12 @@ import pytest
 import yaml
 
 from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.noc.model import Beat, Model
+from fusesoc_firm.noc.network import Network
+from fusesoc_firm.system.hardware.registers import Register
+from fusesoc_firm.system.hardware.status import ENDPOINT_WORDS, Features, Part, endpoint_register, status_map
+from fusesoc_firm.system.message_sources import load_beside
+from fusesoc_firm.system.status_frames import read_request, status_answer
 from fusesoc_firm.system.written.specification import TOPOLOGIES
 from fusesoc_firm.text.diagnostics import InputError
 from tests.hdl.frames import write_stimulus
@@ -363,6 +369,57 @@ def test_an_exchange_answers_every_message(tmp_path: Path, case: str, fabric: st
     assert (tmp_path / "work" / "inner_system_exchange.vhd").is_file()
     for seed, stalls in ((1, 0), (2, 25), (3, 70)):
         assert system.passes(SEED=seed, STALL_PERCENT=stalls)
+
+
+@pytest.mark.parametrize(("fabric", "frames"), [("crossbar", 1), ("mesh", 2)])
+def test_a_status_counts_at_each_endpoint(tmp_path: Path, fabric: str, frames: int) -> None:
+    """A crossbar copies a frame to both readers, of which one takes nothing, so that its queue drops messages."""
+    system = STUCK.build(tmp_path, 8, fabric=fabric, status="frames")
+    exchange = load_beside(tmp_path / "inner.yaml").system.exchange
+    assert exchange
+    places = {end.block: number for number, end in enumerate(exchange.ends)}
+    registers = status_map("inner", 1, 3, features=Features(Part.EXCHANGE, len(exchange.ends))).by_name
+    counts = dict.fromkeys(((end, word) for end in places.values() for word in ENDPOINT_WORDS), 0)
+    counts[places["first"], "sent"] = frames * COUNT
+    counts[places["first"], "stalled"] = stalled_cycles(exchange.network, COUNT)
+    counts[places["stuck"], "received"] = counts[places["right"], "received"] = COUNT
+    counts[places["stuck"], "dropped"] = COUNT - 2
+    # Reading a register takes time, so that messages do not meet.
+    pause = [("magic", 0x4D524946)] * 20
+    ends = [("exchange", len(exchange.ends)), *((endpoint_register(*key), count) for key, count in counts.items())]
+    sent: list[tuple[bytes, list[bytes]]] = []
+    for number in range(COUNT):
+        answers = [pack_frame(0, value(number + 1)), pack_frame(2, value(number + 21))]
+        sent += [(pack_frame(0, value(number)), answers), *asked(registers, pause)]
+    sent += asked(registers, [*pause, *ends])
+    write_stimulus(system.folder / "stimulus.txt", (frame for frame, _ in sent))
+    lines = [f"< @{number} frame\n  {answer.hex()}\n" for number, (_, answers) in enumerate(sent) for answer in answers]
+    (system.folder / "expected.txt").write_text("".join(lines))
+    assert system.passes(SEED=1)
+
+
+def value(number: int) -> bytes:
+    """The payload of a number."""
+    return b"\x00\x01\x00\x00" + number.to_bytes(4, "little")
+
+
+def asked(registers: Mapping[str, Register], words: Sequence[tuple[str, int]]) -> list[tuple[bytes, list[bytes]]]:
+    """Requests of registers, with the answers."""
+    addresses = [(registers[name].address, word) for name, word in words]
+    return [(read_request(address), [status_answer(address, word)]) for address, word in addresses]
+
+
+def stalled_cycles(network: Network, count: int) -> int:
+    """The cycles in which beats of the only source wait in the model, for messages of four beats that do not meet."""
+    model, found = Model(network), 0
+    source = network.flows[0].source
+    for _ in range(count):
+        beats = [Beat(flow, place == 3) for flow in range(len(network.flows)) for place in range(4)]
+        for _ in range(50):
+            taken, _ = model.step({source: beats[0]} if beats else {}, lambda _: True)
+            found += bool(beats) and not taken
+            del beats[: len(taken)]
+    return found
 
 
 # --- any system ------------------------------------------------------------------------------------------------------
