@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
+from rosbags.typesys import Stores, get_typestore, stores
 
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import fail, nearest
+from fusesoc_firm.text.files import read_file, write_whole
+from fusesoc_firm.tools.digests import default_root, digest_of
 
 # The newest distributions with long-term support that the round-trip tests use.
 _DEFAULTS = {1: "noetic", 2: "jazzy"}
@@ -54,18 +59,11 @@ class DistributionStore:
     @property
     def names(self) -> frozenset[MessageName]:
         """The names of all messages in the distribution."""
-        return _names(self._version, self._name)
-
-    @property
-    def _added(self) -> dict[MessageName, str]:
-        return _ADDED.get(self._version, {})
+        return frozenset(_texts(self._version, self._name))
 
     def text(self, name: MessageName) -> str:
         """Return the definition of one of `names` as `.msg` text."""
-        if name in self._added:
-            return self._added[name]
-        text, _ = _typestore(self._name).generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
-        return text.partition(_NEXT_DEFINITION)[0]
+        return _texts(self._version, self._name)[name]
 
     def file(self, name: MessageName) -> str:
         """Return the name for a message's definition in errors, in place of a file's name."""
@@ -73,12 +71,50 @@ class DistributionStore:
 
 
 @cache
-def _typestore(name: str) -> Typestore:
-    return get_typestore(Stores(name))
+def _texts(version: int, name: str) -> dict[MessageName, str]:
+    """Return the texts of all messages in a distribution.
+
+    rosbags takes some 60 ms to load its tables, so the texts are kept in the folder of cached results.
+    """
+    path = texts_folder(os.environ) / f"{name}-{_tables_digest()}.json"
+    texts = _kept(path)
+    if texts is None:
+        texts = _generated(version, name)
+        # Without a folder to write to, the next process loads the tables again.
+        with suppress(OSError):
+            write_whole(path, json.dumps(texts).encode())
+    names = (MessageName(*known.split("/msg/")) for known in texts)
+    return dict(zip(names, texts.values(), strict=True)) | _ADDED.get(version, {})
 
 
-@cache
-def _names(version: int, name: str) -> frozenset[MessageName]:
-    names = {parse_name(known) for known in _typestore(name).fielddefs} | _ADDED.get(version, {}).keys()
-    # rosbags represents the primitives `time` and `duration` of ROS 1 as messages of ROS 2.
-    return frozenset(known for known in names if version == 2 or known.package != "builtin_interfaces")
+def texts_folder(environment: Mapping[str, str]) -> Path:
+    """Return the folder of the texts that earlier processes kept."""
+    return Path(default_root(environment), "definitions")
+
+
+def _kept(path: Path) -> dict[str, str] | None:
+    """Return the texts in a file, or None if the file is missing or damaged."""
+    try:
+        texts = json.loads(read_file(path) or b"")
+    except ValueError:
+        return None
+    is_whole = isinstance(texts, dict) and all("/msg/" in name and isinstance(texts[name], str) for name in texts)
+    return texts if is_whole else None
+
+
+def _tables_digest() -> str:
+    """Return a digest of the state of the files that contain the tables."""
+    with os.scandir(Path(stores.__file__).parent) as files:
+        states = sorted((file.path, file.stat().st_size, file.stat().st_mtime_ns) for file in files if file.is_file())
+    return digest_of(states)
+
+
+def _generated(version: int, name: str) -> dict[str, str]:
+    store = get_typestore(Stores(name))
+    texts = {}
+    for known in store.fielddefs:
+        # rosbags represents the primitives `time` and `duration` of ROS 1 as messages of ROS 2.
+        if version == 2 or not known.startswith("builtin_interfaces/"):
+            text, _ = store.generate_msgdef(known, ros_version=version)
+            texts[known] = text.partition(_NEXT_DEFINITION)[0]
+    return texts

@@ -6,8 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message import ROS1, ROS2, stores
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
@@ -85,6 +87,35 @@ def test_an_unknown_distribution() -> None:
     with pytest.raises(InputError) as caught:
         DistributionStore(2, "jazy")
     assert str(caught.value) == "error: unknown ROS 2 distribution 'jazy'\n      = did you mean 'jazzy'?"
+
+
+def test_definitions_of_a_distribution_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the first process loads the tables of rosbags; a damaged file is replaced."""
+    monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(tmp_path))
+    loaded: list[Stores] = []
+
+    def loading(name: Stores) -> Typestore:
+        loaded.append(name)
+        return get_typestore(name)
+
+    monkeypatch.setattr(stores, "get_typestore", loading)
+
+    def text() -> str:
+        stores._texts.cache_clear()
+        return DistributionStore(2).text(POINT)
+
+    assert text() == text() == "float64 x\nfloat64 y\nfloat64 z\n"
+    assert len(loaded) == 1
+    (file,) = (tmp_path / "definitions").iterdir()
+    for damaged in (b"", b"{", b"[]", b'{"geometry_msgs/msg/Point": 1}', file.read_bytes()[:-1]):
+        file.write_bytes(damaged)
+        loaded.clear()
+        assert text() == text() == "float64 x\nfloat64 y\nfloat64 z\n"
+        assert len(loaded) == 1
+    file.unlink()
+    file.parent.rmdir()
+    file.parent.write_text("not a folder")
+    assert text() == "float64 x\nfloat64 y\nfloat64 z\n"
 
 
 def test_a_package_is_named_by_its_manifest(tmp_path: Path) -> None:
