@@ -13,25 +13,23 @@ Place(type='float64', offset=12, size=8)
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from fusesoc_firm.frame.codec import MessageValue, decode, encode
+from fusesoc_firm.frame import decoder_source, encoder_source  # noqa: F401 - NumPy loads before the first message
+from fusesoc_firm.frame.codec import MessageValue, decode_arrays, encode
 from fusesoc_firm.frame.defaults import completed
+from fusesoc_firm.frame.encoder import encoder
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.tree import rows
-from fusesoc_firm.frame.values import packed, unpacked
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import Definitions, middlewares
-from fusesoc_firm.message.model import ArrayType, MessageName, PrimitiveType, SequenceType, nested_message
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.message.wire import WireType
 from fusesoc_firm.text.diagnostics import fail
 
 
@@ -104,58 +102,20 @@ class Codec:
 
         Raise `CodecError`, a `ValueError`, for an unknown field and for a value that does not fit.
         """
-        plain = self._converted(self._name, message, _plain)
-        return encode(self._frame, completed(self._frame, plain))
+        try:
+            return encoder(self._frame)(message)
+        except Exception:  # noqa: BLE001 - the encoder accepts only complete messages
+            return encode(self._frame, completed(self._frame, message))
 
     def decode(self, payload: bytes | bytearray | memoryview) -> dict[str, Any]:
         """Return the message in a payload.
 
+        Arrays are views of the payload: those of `bytes` are read-only, and those of a `bytearray` change it.
+
         Raise `CodecError`, a `ValueError`, for a payload that is too short or too long or has invalid values.
         """
-        found: dict[str, Any] = self._converted(self._name, decode(self._frame, bytes(payload)), _array)
-        return found
+        return decode_arrays(self._frame, payload if isinstance(payload, bytes | bytearray) else bytes(payload))
 
     def new(self) -> dict[str, Any]:
         """Return a message in which all fields have their defaults, or are zero or empty."""
-        return self.decode(self.encode({}))
-
-    def _converted(self, name: MessageName, value: Any, convert: Callable[[WireType, Any], Any]) -> Any:
-        """Return a copy of a message in which arrays of numbers are converted.
-
-        Values that are not messages are kept, since the encoder reports them.
-        """
-        if not isinstance(value, Mapping):
-            return value
-        message, scalars = dict(value), self._frame.ros.rules.scalars
-        for field in self._definitions[name].fields:
-            given = message.get(field.name)
-            element = field.type.element if isinstance(field.type, ArrayType | SequenceType) else None
-            nested = nested_message(field.type)
-            if isinstance(element, PrimitiveType) and element.name in scalars and given is not None:
-                message[field.name] = convert(scalars[element.name], given)
-            elif nested and element and isinstance(given, list | tuple):
-                message[field.name] = [self._converted(nested, item, convert) for item in given]
-            elif nested and not element and given is not None:
-                message[field.name] = self._converted(nested, given, convert)
-            elif isinstance(given, np.ndarray):
-                message[field.name] = given.tolist()
-        return message
-
-
-def _array(type_: WireType, values: Any) -> np.ndarray[Any, Any]:
-    """Return numbers as an array of their type. Bits are kept, also those of a signalling NaN."""
-    content = values if isinstance(values, bytes) else packed(type_.code, values)
-    return np.frombuffer(content, _dtype(type_)).copy()
-
-
-def _plain(type_: WireType, values: Any) -> Any:
-    """Return an array as numbers for the encoder, which reports all other values."""
-    if not isinstance(values, np.ndarray):
-        return values
-    if values.dtype != _dtype(type_) or values.ndim != 1:
-        return values.tolist()
-    return values.tobytes() if type_.code == "B" else [*unpacked(type_.code, values.tobytes())]
-
-
-def _dtype(type_: WireType) -> np.dtype[Any]:
-    return np.dtype(f"<{type_.code}")
+        return self.decode(bytearray(self.encode({})))

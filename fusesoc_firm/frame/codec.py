@@ -5,7 +5,7 @@ converters; independent serialisers verify them.
 """
 
 from fusesoc_firm.frame.content import trimmed
-from fusesoc_firm.frame.decoder import decode, field_at, field_ranges, used_bytes
+from fusesoc_firm.frame.decoder import decode, decode_arrays, field_at, field_ranges, used_bytes
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.frame.values import CodecError, MessageValue
@@ -14,6 +14,7 @@ __all__ = [
     "CodecError",
     "MessageValue",
     "decode",
+    "decode_arrays",
     "encode",
     "field_at",
     "field_ranges",

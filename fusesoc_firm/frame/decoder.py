@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import Any
 
-from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path
-from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_leaf, text_of, unpacked
+from fusesoc_firm.frame.encoder import empty_elements
+from fusesoc_firm.frame.model import COUNT_BYTES, MOST_EMPTY_ELEMENTS, Data, Fixed, Frame, Loop, Node, Pad, has_bytes
+from fusesoc_firm.frame.values import CodecError, check_bound, dotted
+
+Range = tuple[int, int, tuple[str, ...]]
+"""The first byte of a value, the end, and the path to its field, which is empty for the prefix."""
 
 
 def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
@@ -17,7 +22,32 @@ def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
     Raises:
         CodecError: the payload is too short or too long, has another encoding, or contains invalid values.
     """
-    return _read(frame, payload)[0]
+    return _decoded(_decoder(frame, has_arrays=False), frame, payload)
+
+
+def decode_arrays(frame: Frame, payload: bytes | bytearray) -> dict[str, Any]:
+    """Decode a payload like `decode`, but arrays of numbers become NumPy arrays.
+
+    They are views of the payload, which are read-only if it is of type `bytes`.
+    """
+    return _decoded(_decoder(frame, has_arrays=True), frame, payload)
+
+
+@lru_cache(maxsize=1024)
+def _decoder(frame: Frame, has_arrays: bool) -> Callable[[bytes | bytearray], Any]:
+    # Imported only on use: NumPy is slow to import.
+    from fusesoc_firm.frame.decoder_source import decoder_of
+
+    return decoder_of(frame, has_arrays)
+
+
+def _decoded(read: Callable[[bytes | bytearray], Any], frame: Frame, payload: bytes | bytearray) -> dict[str, Any]:
+    try:
+        message: dict[str, Any] = read(payload)
+    except Exception:
+        _ranges(frame, payload)
+        raise
+    return message
 
 
 def used_bytes(frame: Frame, payload: bytes) -> bytes:
@@ -26,7 +56,7 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
     Raise `CodecError` like `decode`.
     """
     used = bytearray(len(payload))
-    for first, end, _ in _read(frame, payload)[1]:
+    for first, end, _ in _ranges(frame, payload):
         used[first:end] = b"\1" * (end - first)
     return bytes(used)
 
@@ -44,12 +74,12 @@ def field_ranges(frame: Frame, payload: bytes) -> Iterator[tuple[int, int, str]]
 
     Raise `CodecError` like `decode`.
     """
-    for first, end, names in _read(frame, payload)[1]:
+    for first, end, names in _ranges(frame, payload):
         yield first, end, dotted(names)
 
 
-def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int, tuple[str, ...]]]]:
-    """Return the message, and the (first, end, names) ranges of the payload bytes that carry the message."""
+def _ranges(frame: Frame, payload: bytes | bytearray) -> list[Range]:
+    """Return the ranges of the payload bytes that carry the message. Raise `CodecError` like `decode`."""
     if frame.is_fixed_size and not _may_have(len(payload), frame.payload_bytes, frame):
         least = "at least " if frame.trailing_bytes else ""
         size = f"{least}{frame.payload_bytes} bytes, not {len(payload)}"
@@ -57,11 +87,11 @@ def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int,
     checked = payload[: frame.checked_prefix]
     if checked != frame.prefix[: frame.checked_prefix]:
         raise CodecError(f"the payload of {frame.message} has the unknown encoding {checked.hex()}")
-    reader = _Reader(frame, payload)
-    message = reader.read(frame.nodes, 0)
-    if not _may_have(len(payload), reader.position, frame):
-        raise CodecError(f"{frame.message} ends after {reader.position} bytes, but the payload has {len(payload)}")
-    return message, reader.used
+    walk = _Walk(frame, payload)
+    walk.pass_by(frame.nodes)
+    if not _may_have(len(payload), walk.position, frame):
+        raise CodecError(f"{frame.message} ends after {walk.position} bytes, but the payload has {len(payload)}")
+    return walk.used
 
 
 def _may_have(size: int, content: int, frame: Frame) -> bool:
@@ -69,62 +99,42 @@ def _may_have(size: int, content: int, frame: Frame) -> bool:
     return size >= content if frame.trailing_bytes else size == content
 
 
-class _Reader:
-    """A reader at `position` in a payload; `used` lists the (first, end, names) ranges that carry values.
+class _Walk:
+    """A walk to `position` in a payload; `used` lists the ranges that carry values so far."""
 
-    The names are the path to the range's field; they are empty for the prefix.
-    """
-
-    def __init__(self, frame: Frame, payload: bytes) -> None:
+    def __init__(self, frame: Frame, payload: bytes | bytearray) -> None:
         self.position = 0
-        self.used: list[tuple[int, int, tuple[str, ...]]] = [(0, len(frame.prefix), ())]
+        self.used: list[Range] = [(0, len(frame.prefix), ())]
         self._frame = frame
         self._payload = payload
 
-    def read(self, nodes: Sequence[Node], depth: int) -> Any:
-        """Read the message, or the loop's element, that `nodes` describe.
-
-        `depth` is the number of names above the nodes.
-        """
-        message: dict[str, Any] = {}
-        leaves: dict[Path, list[Any]] = {}
+    def pass_by(self, nodes: Sequence[Node]) -> None:
+        """Move behind the parts that `nodes` describe. Raise `CodecError` where the payload does not fit."""
         for node in nodes:
             match node:
                 case Fixed():
-                    self._fixed(node, leaves)
+                    self._fixed(node)
                 case Pad(alignment):
                     self._align(alignment)
-                case Data() | Loop():
-                    # Earlier leaves are stored first, so that a message contains its fields in wire order.
-                    _put_leaves(message, leaves, depth)
-                    value = self._data(node) if isinstance(node, Data) else self._loop(node)
-                    if len(node.path) == depth:
-                        return value  # the element is a string
-                    put(message, node.path[depth:], value)
-        for path, elements in leaves.items():
-            if len(path) == depth:
-                return elements[0]  # the element is a number
-        _put_leaves(message, leaves, depth)
-        return message
+                case Data():
+                    self._data(node)
+                case Loop():
+                    self._loop(node)
 
-    def _fixed(self, node: Fixed, leaves: dict[Path, list[Any]]) -> None:
+    def _fixed(self, node: Fixed) -> None:
         start = self.position
         for leaf in node.fields:
-            elements = leaves.setdefault(leaf.path, [])
             for run in leaf.runs:
                 self.position = start + run.offset
-                elements += self._numbers(leaf, run.count)
+                self._take(run.count * leaf.type.size, leaf.names)
         self.position = start + node.size
         if self.position > len(self._payload):
             self._fail("")
 
-    def _numbers(self, leaf: FrameField, count: int) -> Sequence[Any]:
-        return unpacked(leaf.type.code, self._take(count * leaf.type.size, leaf.names))
-
     def _align(self, alignment: int) -> None:
         self.position += (len(self._frame.prefix) - self.position) % alignment
 
-    def _data(self, node: Data) -> Any:
+    def _data(self, node: Data) -> None:
         count = self._count(node) - node.terminator
         if count < 0:
             raise CodecError(f"'{dotted(node.names)}' has no terminator")
@@ -133,24 +143,25 @@ class _Reader:
             self._align(node.alignment)
         elif count and node.padding:
             self.position += node.padding
-        units = self._take(count * node.element.size, node.names)
+        self._take(count * node.element.size, node.names)
         if any(self._take(node.terminator, node.names)):
             raise CodecError(f"'{dotted(node.names)}' does not end with a zero")
-        if node.kind is not DataKind.ARRAY:
-            return text_of(node, units)
-        return units if node.element.code == "B" else [*unpacked(node.element.code, units)]
 
-    def _loop(self, node: Loop) -> list[Any]:
+    def _loop(self, node: Loop) -> None:
         count = self._count(node) if node.count is None else node.count
         check_bound(node, count)
+        if not has_bytes(node.body) and count > MOST_EMPTY_ELEMENTS:
+            raise empty_elements(node, count)
         if node.number and len(node.body) == 1:
-            return list(self._numbers(node.number, count))
-        return [self.read(node.body, len(node.path)) for _ in range(count)]
+            self._take(count * node.number.type.size, node.number.names)
+            return
+        for _ in range(count):
+            self.pass_by(node.body)
 
     def _count(self, node: Data | Loop) -> int:
         return int.from_bytes(self._take(COUNT_BYTES, node.names), "little")
 
-    def _take(self, size: int, names: tuple[str, ...]) -> bytes:
+    def _take(self, size: int, names: tuple[str, ...]) -> bytes | bytearray:
         first, self.position = self.position, self.position + size
         if self.position > len(self._payload):
             self._fail(f" within '{dotted(names)}'")
@@ -159,10 +170,3 @@ class _Reader:
 
     def _fail(self, where: str) -> None:
         raise CodecError(f"the payload of {self._frame.message} ends{where} after {len(self._payload)} bytes")
-
-
-def _put_leaves(message: dict[str, Any], leaves: dict[Path, list[Any]], depth: int) -> None:
-    """Store the leaves' elements in the message, and clear `leaves`."""
-    for path, elements in leaves.items():
-        put_leaf(message, path[depth:], iter(elements))
-    leaves.clear()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
-from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
+from fusesoc_firm.frame.model import MOST_EMPTY_ELEMENTS, Data, DataKind, Fixed, Frame, Loop, Node, Pad, has_bytes
 from fusesoc_firm.frame.values import (
     BytesLike,
     CodecError,
@@ -14,8 +15,11 @@ from fusesoc_firm.frame.values import (
     check_bound,
     dotted,
     leaf_of,
+    listed,
     packed,
     part_of,
+    put,
+    put_leaf,
     reject_unknown,
     shown,
     units_of,
@@ -23,111 +27,108 @@ from fusesoc_firm.frame.values import (
 from fusesoc_firm.message.wire import WireType
 
 
+@lru_cache(maxsize=1024)
+def encoder(frame: Frame) -> Callable[[Any], bytes]:
+    """Return the generated function that encodes complete messages (`encoder_source`)."""
+    # Imported only on use: NumPy is slow to import.
+    from fusesoc_firm.frame.encoder_source import encoder_of
+
+    return encoder_of(frame)
+
+
 def encode(frame: Frame, message: MessageValue) -> bytes:
     """Return the payload of `message`; padding bytes are zero.
 
-    A missing field is encoded with its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
+    A missing field is encoded with its default. Arrays are lists, tuples or NumPy arrays; `uint8` arrays may also be
+    bytes.
 
     Raises:
         CodecError: a field has neither value nor default, a value does not fit, or a name is unknown.
     """
-    reject_unknown(frame, message)
-    writer = _Writer(len(frame.prefix))
-    writer.write(frame.nodes, message, 0)
-    writer.payload[: len(frame.prefix)] = frame.prefix
-    return bytes(writer.payload)
-
-
-class _Writer:
-    """The payload so far; alignment counts from the end of the prefix, which has `prefix_bytes` bytes."""
-
-    def __init__(self, prefix_bytes: int) -> None:
-        self.payload = bytearray()
-        self._prefix_bytes = prefix_bytes
-
-    def write(self, nodes: Sequence[Node], value: Any, depth: int) -> None:
-        """Append the parts of `value` that `nodes` describe.
-
-        The first `depth` names of the nodes' paths lead to `value`.
-        """
-        for node in nodes:
-            match node:
-                case Fixed():
-                    self._fixed(node, value, depth)
-                case Pad(alignment):
-                    self._align(alignment)
-                case Data():
-                    self._data(node, part_of(value, node, depth))
-                case Loop():
-                    self._loop(node, part_of(value, node, depth))
-
-    def _fixed(self, node: Fixed, value: Any, depth: int) -> None:
-        start = len(self.payload)
-        self.payload += bytes(node.size)
-        for leaf in node.fields:
-            elements = leaf_of(value, leaf, depth)[leaf.first :]
-            taken = 0
-            for run in leaf.runs:
-                data = _pack(leaf.type, elements[taken : taken + run.count], leaf.names)
-                offset = start + run.offset
-                self.payload[offset : offset + len(data)] = data
-                taken += run.count
-
-    def _align(self, alignment: int) -> None:
-        self.payload += bytes((self._prefix_bytes - len(self.payload)) % alignment)
-
-    def _data(self, node: Data, value: Any) -> None:
-        data = _pack_array(node, value) if node.kind is DataKind.ARRAY else units_of(node, value)
-        count = len(data) // node.element.size
-        check_bound(node, count)
-        self._count(count + node.terminator)
-        if count and node.padding is None:
-            self._align(node.alignment)
-        elif count and node.padding:
-            self.payload += bytes(node.padding)
-        self.payload += data
-        self.payload += bytes(node.terminator)
-
-    def _loop(self, node: Loop, value: Any) -> None:
-        if not isinstance(value, list | tuple) or node.count not in (None, len(value)):
-            length = "" if node.count is None else f" of {node.count}"
-            raise CodecError(f"'{dotted(node.names)}' must be a list{length}, not {shown(value)}")
-        check_bound(node, len(value))
-        if node.count is None:
-            self._count(len(value))
-        if node.number and len(node.body) == 1:
-            self.payload += _pack(node.number.type, value, node.names)
-            return
-        for element in value:
-            self.write(node.body, element, len(node.path))
-
-    def _count(self, count: int) -> None:
-        self.payload += count.to_bytes(COUNT_BYTES, "little")
-
-
-def _pack_array(node: Data, value: Any) -> BytesLike:
-    if node.element.code == "B" and isinstance(value, BytesLike):
-        return value
-    if not isinstance(value, list | tuple):
-        raise CodecError(f"'{dotted(node.names)}' must be a list, not {shown(value)}")
-    return _pack(node.element, value, node.names)
-
-
-def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> bytes:
-    """Return the bytes of the values in sequence. Raise `CodecError` for the first value that does not fit."""
+    write = encoder(frame)
     try:
-        return _packed(type_, values)
+        return write(message)
+    except Exception:  # noqa: BLE001 - a value of any type may raise any exception
+        reject_unknown(frame, message)
+        return write(_checked(frame.nodes, message, 0))
+
+
+def _checked(nodes: Sequence[Node], value: Any, depth: int) -> Any:
+    """Return a message, or an element at the end of `depth` names, as the generated encoder accepts it.
+
+    The result has all fields, and no other names. Raise `CodecError` for the first value that does not fit.
+    """
+    checked: dict[str, Any] = {}
+    for node in nodes:
+        match node:
+            case Fixed():
+                for leaf in node.fields:
+                    if leaf.first == 0:
+                        elements = _numbers(leaf.type, leaf_of(value, leaf, depth), leaf.names)
+                        put_leaf(checked, leaf.path[depth:], iter(elements))
+            case Data() | Loop():
+                part = part_of(value, node, depth)
+                found = _data(node, part) if isinstance(node, Data) else _loop(node, part)
+                if len(node.path) == depth:
+                    return found  # the element is a string
+                put(checked, node.path[depth:], found)
+            case Pad():
+                pass
+    return checked
+
+
+def _data(node: Data, value: Any) -> Any:
+    if node.kind is not DataKind.ARRAY:
+        check_bound(node, len(units_of(node, value)) // node.element.size)
+        return value
+    found: Sequence[Any] = _array(node, value, "")
+    check_bound(node, len(found))
+    return found
+
+
+def _loop(node: Loop, value: Any) -> Sequence[Any]:
+    elements = _array(node, value, "" if node.count is None else f" of {node.count}")
+    check_bound(node, len(elements))
+    if not has_bytes(node.body) and len(elements) > MOST_EMPTY_ELEMENTS:
+        raise empty_elements(node, len(elements))
+    return elements if node.number else [_checked(node.body, element, len(node.path)) for element in elements]
+
+
+def _array(node: Data | Loop, value: Any, length: str) -> Sequence[Any]:
+    """Return the elements of an array, numbers after a check. Raise `CodecError` for a value that is not an array."""
+    type_ = node.element if isinstance(node, Data) else node.number.type if node.number else None
+    if type_ and type_.code == "B" and isinstance(node, Data) and isinstance(value, BytesLike):
+        return bytes(value)
+    elements = listed(value, type_)
+    if not isinstance(elements, list | tuple) or (isinstance(node, Loop) and node.count not in (None, len(elements))):
+        raise CodecError(f"'{dotted(node.names)}' must be a list{length}, not {shown(value)}")
+    return _numbers(type_, elements, node.names) if type_ else elements
+
+
+def _numbers(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> list[Any]:
+    """Return the values, with bools of Python. Raise `CodecError` for the first one that does not fit."""
+    try:
+        return _fitting(type_, values)
     except (struct.error, OverflowError, TypeError, ValueError):
         for value in values:
             try:
-                _packed(type_, [value])
+                _fitting(type_, [value])
             except (struct.error, OverflowError, TypeError, ValueError) as error:
                 raise CodecError(f"'{dotted(names)}' must be of type {type_.name}, not {shown(value)}") from error
         raise
 
 
-def _packed(type_: WireType, values: Sequence[Any]) -> bytes:
+def _fitting(type_: WireType, values: Sequence[Any]) -> list[Any]:
+    packed(type_.code, values)
+    if type_.code != "?":
+        return [*values]
     # `struct` accepts any value as a bool, and would encode the text "False" as true.
-    if type_.code == "?" and any(value not in (False, True) for value in values):
+    if any(value not in (False, True) for value in values):
         raise TypeError
-    return packed(type_.code, values)
+    return [bool(value) for value in values]
+
+
+def empty_elements(node: Loop, count: int) -> CodecError:
+    """Return the error of an array with too many elements that have no bytes."""
+    most = f"at most {MOST_EMPTY_ELEMENTS}, since its elements have no bytes"
+    return CodecError(f"the length of '{dotted(node.names)}' must be {most}, not {count}")

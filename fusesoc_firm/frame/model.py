@@ -25,6 +25,8 @@ from fusesoc_firm.text.diagnostics import SourceRef
 ID_BYTES = 1
 LENGTH_BYTES = 4
 COUNT_BYTES = 4
+MOST_EMPTY_ELEMENTS = 1024
+"""The limit of elements without bytes in a variable array; otherwise, four bytes could announce billions of them."""
 
 
 @dataclass(frozen=True)
@@ -258,3 +260,16 @@ def all_nodes(nodes: tuple[Node, ...]) -> Iterator[Node]:
         yield node
         if isinstance(node, Loop):
             yield from all_nodes(node.body)
+
+
+def has_bytes(nodes: tuple[Node, ...]) -> bool:
+    """Return whether nodes have a byte in each message."""
+    return any(
+        bool(node.size) if isinstance(node, Fixed) else isinstance(node, Data) or _has_bytes(node)
+        for node in nodes
+        if not isinstance(node, Pad)
+    )
+
+
+def _has_bytes(loop: Loop) -> bool:
+    return loop.count is None or (loop.count > 0 and has_bytes(loop.body))

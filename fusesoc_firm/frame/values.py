@@ -12,6 +12,7 @@ from reprlib import Repr
 from typing import Any
 
 from fusesoc_firm.frame.model import Data, DataKind, Frame, FrameField, Loop, NameTree, Path
+from fusesoc_firm.message.wire import WireType
 from fusesoc_firm.text.diagnostics import closest
 
 MessageValue = Mapping[str, Any]
@@ -168,6 +169,15 @@ def without_arrays(value: Any) -> Any:
     return [without_arrays(item) for item in value] if has_more else value
 
 
+def listed(value: Any, type_: WireType | None) -> Any:
+    """Return an array, such as one of NumPy, as a list; the numbers of an array of `type_` keep their bits."""
+    if not hasattr(value, "tolist"):
+        return value
+    if type_ and getattr(value, "dtype", None) == f"<{type_.code}" and value.ndim == 1:
+        return [*unpacked(type_.code, value.tobytes())]
+    return value.tolist()
+
+
 def units_of(data: Data, text: object) -> BytesLike:
     """Return the bytes of a text on the wire, without count and terminator. Raise `CodecError` for any other value."""
     if not isinstance(text, str):
@@ -233,6 +243,7 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
     if step.count is None:
         yield from _elements(inner, rest, leaf)
         return
+    inner = inner if rest else listed(inner, leaf.type)
     is_array = isinstance(inner, list | tuple) or (not rest and leaf.type.code == "B" and isinstance(inner, BytesLike))
     if not is_array or len(inner) != step.count:
         raise CodecError(f"'{step.name}' must be a list of {step.count}, not {shown(inner)}")

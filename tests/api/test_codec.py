@@ -126,10 +126,22 @@ def test_the_bits_of_a_signalling_nan_are_kept(tmp_path: Path) -> None:
     assert ours.encode(ours.decode(payload)) == payload
 
 
-def test_a_decoded_array_can_be_changed() -> None:
-    message = codec("sensor_msgs/LaserScan").decode(codec("sensor_msgs/LaserScan").encode({"ranges": [1.0]}))
-    message["ranges"][0] = 2.0
-    assert codec("sensor_msgs/LaserScan").decode(codec("sensor_msgs/LaserScan").encode(message))["ranges"] == [2.0]
+def test_arrays_are_views_of_the_payload() -> None:
+    scan = codec("sensor_msgs/LaserScan")
+    payload = scan.encode({"ranges": [1.0, 3.0]})
+    with pytest.raises(ValueError, match="read-only"):
+        scan.decode(payload)["ranges"][0] = 2.0
+    own_bytes = bytearray(payload)
+    scan.decode(own_bytes)["ranges"][0] = 2.0
+    assert scan.decode(own_bytes)["ranges"].tolist() == [2.0, 3.0]
+    assert scan.decode(memoryview(payload))["ranges"].tolist() == [1.0, 3.0]
+
+
+def test_a_new_message_can_be_changed() -> None:
+    imu = codec("sensor_msgs/Imu")
+    message = imu.new()
+    message["orientation_covariance"][0] = 2.0
+    assert imu.decode(imu.encode(message))["orientation_covariance"][0] == 2.0
 
 
 def test_the_layout_has_offsets_and_sizes_in_bytes() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from fusesoc_firm.frame.codec import CodecError, decode, encode, pack_frame, used_bytes
+from fusesoc_firm.frame.codec import CodecError, decode, decode_arrays, encode, pack_frame, used_bytes
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
@@ -203,6 +205,53 @@ def test_every_cut_of_a_payload_is_an_error() -> None:
     for length in range(len(payload)):
         with pytest.raises(CodecError):
             decode(made, payload[:length])
+
+
+NOTHING = ["uint8[0] none\n", ""]
+
+
+@pytest.mark.parametrize("inner", NOTHING)
+def test_elements_without_bytes_are_limited(inner: str) -> None:
+    """Four bytes could announce four billion elements."""
+    made = frame(ROS1, "Inner[] s\n", Inner=inner)
+    element: dict[str, Any] = {"none": []} if inner else {}
+    most = {"s": [element] * 1024}
+    assert decode(made, encode(made, most)) == most
+    error = "^the length of 's' must be at most 1024, since its elements have no bytes, not "
+    with pytest.raises(CodecError, match=f"{error}4294967295$"):
+        decode(made, b"\xff" * 4)
+    with pytest.raises(CodecError, match=f"{error}1025$"):
+        encode(made, {"s": [element] * 1025})
+
+
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+@pytest.mark.parametrize("read", [decode, decode_arrays])
+def test_hostile_bytes_allocate_little(ros: Middleware, read: Callable[[Frame, bytes], Any]) -> None:
+    """Every word may be a count; the limit is far above what 200 bytes contain."""
+    text = "string s\nfloat64[] f\nInner[] many\nstring[] texts\nbool[] flags\nuint8[] octets\n"
+    made = frame(ros, text, Inner="string t\nuint16[] n\nDeep[2] two\n", Deep="string[] names\n")
+    value = {
+        "s": "a",
+        "f": [1.0],
+        "many": [{"t": "b", "n": [2, 3], "two": [{"names": ["x"]}] * 2}],
+        "texts": ["c", ""],
+        "flags": [True],
+        "octets": b"d",
+    }
+    payload = encode(made, value)
+    read(made, payload)  # generates the function
+    refused = 0
+    for place in range(len(payload) - 4):
+        for word in (b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\1\0", b"\0\1\0\0"):
+            tracemalloc.start()
+            try:
+                read(made, payload[:place] + word + payload[place + 4 :])
+            except CodecError:
+                refused += 1
+            peak = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+            assert peak < 200_000, place
+    assert refused > 100
 
 
 def test_padding_is_not_used() -> None:

@@ -14,9 +14,11 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from fusesoc_firm.frame.codec import decode, encode, trimmed, used_bytes
+from fusesoc_firm.frame import decoder, encoder
+from fusesoc_firm.frame.codec import decode, decode_arrays, encode, trimmed, used_bytes
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
@@ -25,7 +27,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MessageDefinition, Middleware
 from fusesoc_firm.message.model import ArrayType, FieldType, MessageName, SequenceType, StringType
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.runs.verify.stimuli import EMPTY, KINDS, Stimuli
+from fusesoc_firm.runs.verify.stimuli import EMPTY, KINDS, ONE, Stimuli
 from fusesoc_firm.text.diagnostics import InputError
 from tests.frame.genpy_oracle import GenpyOracle, has_genpy
 from tests.frame.oracle import DefinitionsOracle, Oracle, is_same
@@ -52,6 +54,9 @@ def check(frame: Frame, serialise: Serialise, value: Mapping[str, Any], kind: st
     told = f"{frame.message}: {value}"
     assert encode(frame, value) == bytes(byte if use else 0 for byte, use in zip(payload, used, strict=True)), told
     assert is_same(decode(frame, payload), value), told
+    arrays = decode_arrays(frame, payload)
+    assert is_same(lists_of(arrays), lists_of(value)), told
+    assert encode(frame, arrays) == encode(frame, value), told
     if frame.ros is ROS2:
         assert trimmed(frame, payload + b"\xff" * 9) == payload, told
     length = length_of(frame)
@@ -63,6 +68,15 @@ def check(frame: Frame, serialise: Serialise, value: Mapping[str, Any], kind: st
     # The content of padding must have no effect.
     garbage = bytes(byte if use else byte ^ 0xA5 for byte, use in zip(payload, used, strict=True))
     assert is_same(decode(frame, garbage), value), told
+
+
+def lists_of(value: Any) -> Any:
+    """A message with lists instead of arrays and bytes."""
+    if isinstance(value, dict):
+        return {name: lists_of(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [lists_of(inner) for inner in value]
+    return [*value] if isinstance(value, bytes) else value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def check_all(
@@ -83,6 +97,22 @@ def test_every_message_of_a_distribution_against_rosbags(ros: Middleware, distri
     assert len(oracle.messages()) > 130
     for name in oracle.messages():
         check_all(parse_name(name), oracle.closure(name), rosbags(oracle, name), chance)
+
+
+def test_generated_functions_need_no_second_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The check of a value, and the walk through a payload, are only for faults."""
+    monkeypatch.setattr(encoder, "_checked", None)
+    monkeypatch.setattr(decoder, "_ranges", None)
+    chance = new_seed()
+    for ros in (ROS1, ROS2):
+        oracle = Oracle(ros)
+        for name in oracle.messages():
+            frame, definitions = oracle.frame(name), oracle.closure(name)
+            value = decode(
+                frame, oracle.serialise(name, Stimuli(definitions, ros, chance).message(parse_name(name), ONE))
+            )
+            assert is_same(decode(frame, encode(frame, value)), value)
+            assert encode(frame, decode_arrays(frame, encode(frame, value))) == encode(frame, value)
 
 
 @needs_genpy
