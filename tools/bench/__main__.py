@@ -18,6 +18,7 @@ from tools.bench import (
     applications,
     area,
     builds,
+    codec,
     cycles,
     figures,
     fuzz,
@@ -126,6 +127,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "live": lambda: live.measure(_tell, figures.written(), arguments.row),
         "resize": lambda: resize.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
+        "codec": lambda: codec.measure(_tell),
         "studio": lambda: _studio(arguments),
     }
     return measures[part]()

@@ -15,6 +15,7 @@ from tools.bench import (
     applications,
     area,
     builds,
+    codec,
     cycles,
     fuzz,
     fuzz_systems,
@@ -107,6 +108,7 @@ PAGES = (
     ),
     Page("network", "Figures of a node in fabric", "area and clock", ("network",)),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
+    Page("codec", "Figures of the codec", "the time of encoding and decoding in Python", ("codec",)),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
 )
 _HEADINGS = {
@@ -134,6 +136,7 @@ _HEADINGS = {
     "replay": "Replay",
     "live": "Live nodes",
     "resize": "Resize, a replica",
+    "codec": "Codec",
     "studio": "The page",
 }
 _METHODS = {
@@ -192,6 +195,8 @@ _METHODS = {
     "live": """[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.
         `make bench BENCH="live --row 'Images'"` measures only the tables whose titles match.""",
     "resize": "[specs/resize](../../specs/resize/README.md) is a replica of RobotPerf's benchmark a5, resize.",
+    "codec": """[`codec`](../how-to/use-python.md) is compared with other codecs for Python. One of them is an
+        extra package: `pip install mcap-ros2-support-fast`.""",
     "studio": "A browser opens [the page](../how-to/studio.md) and edits a system.",
 }
 _INTRODUCTION = """# {title}
@@ -238,6 +243,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         replay,
         live,
         resize,
+        codec,
     )
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
@@ -284,8 +290,9 @@ def _versions(part: str) -> str:
     if part in ("loops", "passing", "inner_topics"):
         programs = ("ghdl", "yosys", "verilator") if part == "loops" else ("ghdl",)
         return ", ".join([*map(_first_line, programs), _package("rosbags")])
-    if part == "use":
-        return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
+    if part in ("use", "codec"):
+        others = codec.versions() if part == "codec" else []
+        return ", ".join([f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}", *others])
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
