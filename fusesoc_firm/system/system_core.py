@@ -313,7 +313,7 @@ def status_text(loaded: LoadedSystem) -> str:
     system = loaded.system
     shape = len(system.subscribers), len(system.publishers)
     digest = identity(loaded).digest
-    return status_description(system.name, *shape, digest, features_of(system))
+    return status_description(system.name, shape, digest, features_of(system), system.parameters)
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:

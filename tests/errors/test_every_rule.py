@@ -51,6 +51,10 @@ OTHER_FAULTS = {
     ("system/register_files.py", "write_register_files"): "a right specification without a status",
     ("system/hardware/compiled.py", "_of_budget"): "the function of an accelerator, in tests/system/test_limits.py",
     ("system/hardware/compiled.py", "_refuse_limit"): "the function of an accelerator, in tests/system/test_limits.py",
+    (
+        "system/derived/parameters.py",
+        "check_number",
+    ): "a system of 1,025 parameters, in tests/system/test_parameters.py",
     ("system/derived/status.py", "_check_id"): "a system of 256 converters, in test_status",
     ("system/derived/status.py", "_check_channels"): "a system of 4,097 converters, in test_status",
     ("system/derived/timing.py", "tasks_of"): "a question that a right specification does not answer",

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from fusesoc_firm.system.boards.board import Board, board_entity
 from fusesoc_firm.system.boards.processor import PROCESSORS
-from fusesoc_firm.system.derived.model import Clock, DerivedSystem
+from fusesoc_firm.system.derived.model import BlockParameter, Clock, DerivedSystem
 from fusesoc_firm.system.hardware.crossings import Crossing, Scope, all_crossings, port_of, word
 from fusesoc_firm.system.hardware.names import Names, reset_label, resets, synchronised_pins
 from fusesoc_firm.text.render import Context
@@ -31,7 +31,10 @@ def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction, s
     return {
         "description": str(board.description),
         "clocks": [{"name": name, "port": port, "period": period(frequency)} for name, port, frequency in clocks],
-        "crossings": [found.crossing(item) for item in all_crossings(system) if item.is_clocked],
+        "crossings": [
+            *(found.crossing(item) for item in all_crossings(system) if item.is_clocked),
+            *(found.parameter(item) for item in system.parameters if system.clock_of(item.block)),
+        ],
         "pins": [
             {"first": separator.join((names.label(block.block, pin.name, "sync"), "first_r"))}
             for block, pin in synchronised_pins(system)
@@ -87,6 +90,18 @@ class _Constraints:
             "held": [*self._held(crossing, streams)],
             "fields": [*self._fields(crossing)] if crossing.frame.is_fixed_size else [],
         }
+
+    def parameter(self, item: BlockParameter) -> Context:
+        """Return the constraints on the words of a parameter, which cross to the clock of its block and back."""
+        clock = self.system.clock_of(item.block)
+        levels, held = [], []
+        for way, source, sink in (("there", None, clock), ("back", clock, None)):
+            label = self._register(self.names.label(item.block, item.parameter.name, way), "u_message")
+            levels.append(self._path(label, "request_r", "u_request", self._cycle(sink)))
+            levels.append(self._path(label, "answer_r", "u_return", self._cycle(source)))
+            held.append({"source": self._register(label, "fields_r"), "period": _nanoseconds(self._cycle(sink))})
+        ends = f"the parameter {item.name}, clk and {port_of(clock)}"
+        return {"ends": ends, "levels": levels, "pointers": [], "held": held, "fields": []}
 
     def _levels(self, crossing: Crossing, scope: Scope) -> Iterator[Context]:
         label = self.names.crossing_label(crossing, word(scope.handshake.part, "crossing"))

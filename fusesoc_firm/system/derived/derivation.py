@@ -26,6 +26,7 @@ from fusesoc_firm.system.derived.link import link_of
 from fusesoc_firm.system.derived.longest import with_longest_payloads, with_longest_sent
 from fusesoc_firm.system.derived.model import Action, Connection, Converter, DerivedSystem, End, Service
 from fusesoc_firm.system.derived.network import network_of
+from fusesoc_firm.system.derived.parameters import check_number
 from fusesoc_firm.system.derived.partition import Parting, Parts, message_names
 from fusesoc_firm.system.derived.quality import quality_of
 from fusesoc_firm.system.derived.queue import queue_of
@@ -97,6 +98,7 @@ def derive(
     )
     check_entities(system, parts.blocks, faults)
     check_held(system, parts.blocks, faults)
+    check_number(system, project, faults)
     faults.raise_if_any()
     return with_lateness_buffers(system, project, faults)
 

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
@@ -16,6 +18,7 @@ from itertools import chain
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.wire import WireType
 from fusesoc_firm.noc import network as noc
 from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.naming import identifier
@@ -191,6 +194,66 @@ class MessageSide:
 
 
 @dataclass(frozen=True)
+class Parameter:
+    """A number that software sets at run time, between `least` and `most`, as the port `name` of an accelerator."""
+
+    name: str
+    type: WireType
+    default: float
+    least: float
+    most: float
+
+    @property
+    def is_float(self) -> bool:
+        """Whether the number is a float32."""
+        return self.type.code == "f"
+
+    @property
+    def port_bits(self) -> int | None:
+        """The bits of the port, or None for a `std_logic`."""
+        return None if self.type.bits == 1 else self.type.bits
+
+    @property
+    def range(self) -> str:
+        """The legal values, for messages."""
+        return "true, false" if self.type.code == "?" else f"{self.least:.9g} to {self.most:.9g}"
+
+    def word(self, value: float) -> int:
+        """Return the register's word of a value. Raise `ValueError`, with the legal values, for an illegal one."""
+        is_number = isinstance(value, float | int) and isinstance(value, bool) == (self.type.code == "?")
+        if not is_number or not (self.is_float or isinstance(value, int)):
+            raise ValueError(f"{value!r} is not a {self.type.name}; legal: {self.range}")
+        with suppress(OverflowError):
+            # The sum has no negative zero, which the hardware orders below zero.
+            rounded = struct.unpack("<f", struct.pack("<f", value))[0] + 0.0 if self.is_float else value
+            if self.least <= rounded <= self.most:
+                return int.from_bytes(struct.pack("<f" if self.is_float else "<q", rounded)[:4], "little")
+        raise ValueError(f"{value} is outside of the range; legal: {self.range}")
+
+    def value(self, word: int) -> float:
+        """Return the value of a register's word."""
+        data = word.to_bytes(4, "little")
+        if self.type.code == "?":
+            return bool(word & 1)
+        found: float = struct.unpack_from(f"<{self.type.code}", data)[0]
+        return found
+
+
+@dataclass(frozen=True)
+class BlockParameter:
+    """A parameter of a block; `number` is its place among all parameters of the system."""
+
+    number: int
+    block: str
+    parameter: Parameter
+
+    @property
+    def name(self) -> str:
+        """The name of the node's parameter."""
+        return f"{self.block}.{self.parameter.name}"
+
+
+@dataclass(frozen=True)
 class AcceleratorType:
     """An accelerator with resolved messages and `width`-bit streams; with `has_width`, WIDTH sets the width.
 
@@ -203,6 +266,7 @@ class AcceleratorType:
     width: int
     has_width: bool = False
     inner: AcceleratorType | None = None
+    parameters: tuple[Parameter, ...] = ()
 
     @property
     def own(self) -> AcceleratorType:
@@ -566,6 +630,12 @@ class DerivedSystem:
         """The index of each publisher's Manager input, by id."""
         order = chain.from_iterable(self.tree.groups) if self.tree else range(len(self.publishers))
         return {number: place for place, number in enumerate(order)}
+
+    @cached_property
+    def parameters(self) -> tuple[BlockParameter, ...]:
+        """The parameters of all accelerators, in the order of the blocks."""
+        found = ((item.block, parameter) for item in self.accelerators for parameter in item.type.parameters)
+        return tuple(BlockParameter(number, *each) for number, each in enumerate(found))
 
     def clock_of(self, block: str) -> Clock | None:
         """Return the clock of a block, or None for the system's clock."""

@@ -7,6 +7,7 @@ from fusesoc_firm.system.derived.sides import accelerator_ports
 from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE, Pin
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.yaml_text import Text
 
 # The width of the largest port that a message can have.
 _MOST_BITS = 65536
@@ -24,10 +25,15 @@ def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
         )
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
-    taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
-    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_)}
+    taken = port_owners(type_)
     for pin in accelerator.pins:
         _check_pin(pin, taken, faults)
+
+
+def port_owners(type_: AcceleratorType) -> dict[str, str]:
+    """Return the owner of each port of an accelerator except pins and parameters, by the name in lower case."""
+    taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
+    return taken | {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_)}
 
 
 def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
@@ -37,12 +43,17 @@ def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if "synchroniser" in pin.places and pin.direction == "out":
         message = f"'synchroniser' is legal only for inputs, but pin '{pin.name}' has the direction {pin.direction}"
         faults.error(message, pin.place("synchroniser"), "remove the key")
-    if not pin.name:
+    check_name("pin", pin.name, taken, faults)
+
+
+def check_name(what: str, name: Text, taken: dict[str, str], faults: Diagnostics) -> None:
+    """Note a name that cannot be a port beside those in `taken`, and add it to them."""
+    if not name:
         return
-    if identifier(pin.name) != pin.name:
+    if identifier(name) != name:
         hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
-        faults.error(f"'{pin.name}' is not a legal port name", pin.name.source, hint)
-    elif owner := taken.get(pin.name.lower()):
+        faults.error(f"'{name}' is not a legal port name", name.source, hint)
+    elif owner := taken.get(name.lower()):
         hint = "the names of an entity's ports must differ in more than case"
-        faults.error(f"a pin cannot have the name '{pin.name}', which is {owner}", pin.name.source, hint)
-    taken[pin.name.lower()] = f"the pin at {pin.name.source}"
+        faults.error(f"a {what} cannot have the name '{name}', which is {owner}", name.source, hint)
+    taken[name.lower()] = f"the {what} at {name.source}"

@@ -23,6 +23,7 @@ from fusesoc_firm.system.derived.cpp_function import check_kernel, check_varying
 from fusesoc_firm.system.derived.ids import check_count
 from fusesoc_firm.system.derived.length import output_length
 from fusesoc_firm.system.derived.model import AcceleratorBlock, AcceleratorType, End, MessageSide, PayloadLength, Topic
+from fusesoc_firm.system.derived.parameters import check_parameters, parameters_of
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
 from fusesoc_firm.system.derived.quality import check_quality
@@ -175,7 +176,14 @@ class _Resolver:
                 continue
             sources = [self.folder / source for source in accelerator.sources]
             width = accelerator.width or self.specification.project.width
-            found = AcceleratorType(accelerator, inputs, outputs, width, declares_width(accelerator, sources))
+            found = AcceleratorType(
+                accelerator,
+                inputs,
+                outputs,
+                width,
+                declares_width(accelerator, sources),
+                parameters=parameters_of(accelerator, self.specification.project, self.faults),
+            )
             found = with_bypass(found, self.faults)
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
@@ -185,6 +193,7 @@ class _Resolver:
             if accelerator.is_compiled:
                 check_varying(found.own, self.faults)
             check_pins(found, self.faults)
+            check_parameters(found, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())

@@ -33,7 +33,7 @@ def bypass_configuration(type_: AcceleratorType) -> Context:
         "has_width": type_.inner.has_width,
         "width": type_.width,
         "ports": [*declarations(type_), *_pins(type_)],
-        "pins": [str(pin.name) for pin in type_.accelerator.pins],
+        "pins": [pin["name"] for pin in _pins(type_)],
         "is_fixed": source.frame.is_fixed_size,
         "waits_for_end": last == segments - 1 and not _is_followed(source, last),
         "last": last,
@@ -58,9 +58,12 @@ def _is_followed(source: MessageSide, segment: int) -> bool:
 
 
 def _pins(type_: AcceleratorType) -> list[Context]:
+    """Return the ports of pins and parameters."""
+    ports = [(str(pin.name), str(pin.direction), pin.bits) for pin in type_.accelerator.pins]
+    ports += [(item.name, "in", item.port_bits) for item in type_.parameters]
     return [
-        {"name": str(pin.name), "direction": str(pin.direction), "type": vhdl_type(pin.bits), "comment": ""}
-        for pin in type_.accelerator.pins
+        {"name": name, "direction": direction, "type": vhdl_type(bits), "comment": ""}
+        for name, direction, bits in ports
     ]
 
 

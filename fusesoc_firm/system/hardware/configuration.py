@@ -31,6 +31,7 @@ from fusesoc_firm.system.hardware.names import (
     seen_reset,
     synchronised_pins,
 )
+from fusesoc_firm.system.hardware.parameters import parameter_blocks, parameter_signals
 from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
 from fusesoc_firm.system.hardware.status import status_configuration
 from fusesoc_firm.system.hardware.waits import waits_configuration, watched_entity
@@ -53,7 +54,7 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         "entity": watched_entity(system) if is_watched else system.entity,
         "name": system.name,
         **interconnect_configuration(system),
-        **status_configuration(system, names),
+        **status_configuration(names, system),
         **scheduler_configuration(system),
         "has_watchdog": system.watchdog > 0,
         "clocks": _clocks(system),
@@ -74,6 +75,8 @@ def system_configuration(system: DerivedSystem, *, is_watched: bool = False) -> 
         ],
         "pins": pin_groups(names, system),
         "synchronisers": [pin_synchroniser(names, *pin, system) for pin in synchronised_pins(system)],
+        "parameters": parameter_signals(names, system),
+        "parameter_blocks": parameter_blocks(names, system),
         "connections": connections(names, system),
         "watched": waits_configuration(system) if is_watched else None,
     }

@@ -242,6 +242,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
     for pin in type_.accelerator.pins:
         signal = names.synced if pin.is_synchronised else names.port
         ports.append((str(pin.name), signal(block.block, pin.name)))
+    ports += [(item.name, names.port(block.block, item.name)) for item in type_.parameters]
     return {
         "differences": ", ".join(differences),
         **instance(
@@ -276,6 +277,7 @@ def component(type_: AcceleratorType) -> dict[str, Any]:
     """Return the component declaration of an accelerator that is not an entity."""
     ports = [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
+    ports += [(item.name, False, item.port_bits) for item in type_.parameters]
     return {
         "entity": type_.entity,
         "has_width": type_.has_width,

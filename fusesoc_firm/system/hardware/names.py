@@ -9,6 +9,7 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.converter.payload_length import length_entity
 from fusesoc_firm.system.derived.model import (
     AcceleratorBlock,
+    BlockParameter,
     Clock,
     Connection,
     Converter,
@@ -79,7 +80,7 @@ class Names:
         self._labels = dict(zip(labels, label_names, strict=True))
         reserved = {*taken_names(), system.entity, *_entities(system), *label_names, *clock_names(system)}
         # Pins are named first, so that they get the requested names.
-        keys = [*_pins(system), *_ports(system), *_signals(system)]
+        keys = [*_pins(system), *_ports(system), *_parameters(system), *_signals(system)]
         self._signals: Mapping[_Key, str] = dict(zip(keys, distinct_identifiers(keys, reserved), strict=True))
 
     def label(self, *words: str) -> str:
@@ -93,6 +94,14 @@ class Names:
     def synced(self, block: str, pin: str) -> str:
         """Return the signal of a pin after its synchroniser."""
         return self._signals[block, pin, "synced"]
+
+    def parameter(self, item: BlockParameter, word: str = "") -> str:
+        """Return the signal of a parameter's port, or one of `parameter_words`."""
+        return self._signals[item.block, item.parameter.name, *([word, "word"] if word else [])]
+
+    def between(self, block: str) -> str:
+        """Return the signal that tells whether the next edge is between two messages of a block."""
+        return self._signals[block, "", "between"]
 
     def at(self, end: End, port: str) -> str:
         """Return the signal of a message's port at one end of a connection."""
@@ -158,6 +167,9 @@ def _labels(system: DerivedSystem) -> Iterator[_Key]:
     yield from (("u", item.block, queue_word(item.queue)) for item in system.subscribers if item.queue)
     yield from (("u", item.block, "late") for item in system.publishers if item.late_bytes)
     yield from (("u", block.block, str(pin.name), "sync") for block, pin in synchronised_pins(system))
+    for parameter in system.parameters:
+        words = ("parameter", *(("there", "back") if system.clock_of(parameter.block) else ()))
+        yield from (("u", parameter.block, parameter.parameter.name, word) for word in words)
     for crossing in all_crossings(system):
         yield from (("u", *_crossing_key(crossing, word)) for word in crossing.instances())
 
@@ -168,6 +180,18 @@ def _pins(system: DerivedSystem) -> Iterator[_Key]:
 
 def _ports(system: DerivedSystem) -> Iterator[_Key]:
     return ((block, f"{prefix}{port.name}") for block, sides in blocks(system) for prefix, port in sides)
+
+
+def parameter_words(item: BlockParameter, system: DerivedSystem) -> tuple[str, ...]:
+    """Return the words of a parameter: those of its registers, and both in the domain of a block with another clock."""
+    return ("wanted", "value", *(("there", "back") if system.clock_of(item.block) else ()))
+
+
+def _parameters(system: DerivedSystem) -> Iterator[_Key]:
+    yield from ((block, "", "between") for block in dict.fromkeys(item.block for item in system.parameters))
+    for item in system.parameters:
+        yield item.block, item.parameter.name
+        yield from ((item.block, item.parameter.name, word, "word") for word in parameter_words(item, system))
 
 
 def _signals(system: DerivedSystem) -> Iterator[_Key]:

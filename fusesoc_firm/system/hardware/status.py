@@ -10,11 +10,12 @@ from enum import Flag
 from typing import NamedTuple
 
 from fusesoc_firm.converter.vhdl import index_bits
-from fusesoc_firm.system.derived.model import Converter, DerivedSystem, StatusAccess
+from fusesoc_firm.system.derived.model import BlockParameter, Converter, DerivedSystem, StatusAccess
 from fusesoc_firm.system.derived.status import TREE_CHANNELS
 from fusesoc_firm.system.hardware.instances import ERROR_CODE_BITS, INNER, error_of
 from fusesoc_firm.system.hardware.interconnect import NETWORK_FAULTS
 from fusesoc_firm.system.hardware.names import Names
+from fusesoc_firm.system.hardware.parameters import parameter_registers
 from fusesoc_firm.system.hardware.registers import RegisterMap, register_map
 from fusesoc_firm.text.render import Context, render
 
@@ -25,7 +26,7 @@ DIGEST_ADDRESS, DIGEST_WORDS = 0x30, 4
 _NETWORK_ADDRESS = 0x40
 # The number of endpoints of an exchange, and their counters.
 ENDPOINTS_ADDRESS = 0x2C
-_EXCHANGE_ADDRESS, _ENDPOINT_BYTES = 0x400, 0x20
+_EXCHANGE_ADDRESS, _ENDPOINT_BYTES = 0x4000, 0x20
 _CHANNELS_ADDRESS, _CHANNEL_BYTES = 0x8000, 0x40
 _WORD_DIGITS = 8
 
@@ -87,9 +88,14 @@ def identity_of(system: DerivedSystem, signatures: Sequence[str]) -> Identity:
         [_described(item) for item in system.subscribers],
         [_described(item) for item in system.publishers],
         [*signatures],
+        *([[[item.name, *map(str, _facts(item))] for item in system.parameters]] if system.parameters else []),
     ]
     digest = hashlib.sha256(json.dumps(described).encode()).hexdigest()[: DIGEST_WORDS * _WORD_DIGITS]
     return Identity(digest, tuple(text.removeprefix("RIHS01_")[:_WORD_DIGITS] for text in signatures))
+
+
+def _facts(item: BlockParameter) -> tuple[object, ...]:
+    return item.parameter.type.name, item.parameter.default, item.parameter.least, item.parameter.most
 
 
 def _described(item: Converter) -> list[object]:
@@ -97,9 +103,17 @@ def _described(item: Converter) -> list[object]:
 
 
 def status_description(
-    name: str, subscribers: int, publishers: int, digest: str = "", features: Features = NO_FEATURES
+    name: str,
+    shape: tuple[int, int],
+    digest: str = "",
+    features: Features = NO_FEATURES,
+    parameters: tuple[BlockParameter, ...] = (),
 ) -> str:
-    """Return the description of a status in SystemRDL; without a `digest`, its registers have the value 0."""
+    """Return the description of a status in SystemRDL; without a `digest`, its registers have the value 0.
+
+    The `shape` is the number of subscribers and that of publishers.
+    """
+    subscribers, publishers = shape
     digits = digest or "0" * (DIGEST_WORDS * _WORD_DIGITS)
     return render(
         DESCRIPTION_TEMPLATE,
@@ -112,7 +126,7 @@ def status_description(
                 {
                     "register": _network_register(name),
                     "title": f"Times that {meaning}",
-                    "address": f"{_NETWORK_ADDRESS + 4 * number:03x}",
+                    "address": f"{_NETWORK_ADDRESS + 4 * number:x}",
                 }
                 for number, (name, meaning) in enumerate(NETWORK_FAULTS.items())
             ]
@@ -123,18 +137,19 @@ def status_description(
                 {
                     "register": endpoint_register(number, word),
                     "title": f"{meaning}, endpoint {number}",
-                    "address": f"{_EXCHANGE_ADDRESS + number * _ENDPOINT_BYTES + 4 * place:03x}",
+                    "address": f"{_EXCHANGE_ADDRESS + number * _ENDPOINT_BYTES + 4 * place:x}",
                 }
                 for number in range(features.endpoints)
                 for place, (word, meaning) in enumerate(ENDPOINT_WORDS.items())
             ],
+            "parameters": parameter_registers(parameters),
             "publisher_address": f"{_CHANNELS_ADDRESS + subscribers * _CHANNEL_BYTES:x}",
             "digest": [
                 {
                     "number": number,
                     "low": 32 * number,
                     "word": digits[len(digits) - (number + 1) * _WORD_DIGITS : len(digits) - number * _WORD_DIGITS],
-                    "address": f"{DIGEST_ADDRESS + 4 * number:03x}",
+                    "address": f"{DIGEST_ADDRESS + 4 * number:x}",
                 }
                 for number in range(DIGEST_WORDS)
             ],
@@ -146,7 +161,7 @@ def status_map(
     name: str, subscribers: int, publishers: int, digest: str = "", features: Features = NO_FEATURES
 ) -> RegisterMap:
     """Return the registers of a status."""
-    return register_map(status_description(name, subscribers, publishers, digest, features))
+    return register_map(status_description(name, (subscribers, publishers), digest, features))
 
 
 def endpoint_register(number: int, word: str) -> str:
@@ -179,7 +194,7 @@ def status_entity(system: DerivedSystem) -> str:
     return f"{system.name}_status"
 
 
-def status_configuration(system: DerivedSystem, names: Names) -> Context:
+def status_configuration(names: Names, system: DerivedSystem) -> Context:
     """Return the connection of the status to the top level, and the resulting changes there."""
     return {
         "scope": INNER if system.status else "",
@@ -188,7 +203,7 @@ def status_configuration(system: DerivedSystem, names: Names) -> Context:
         "manager_tid": _manager_tid(system),
         "has_status": bool(system.status),
         "status_bus": system.status is StatusAccess.AXI_LITE,
-        "status": _instances(system, names) if system.status else None,
+        "status": _instances(names, system) if system.status else None,
     }
 
 
@@ -209,7 +224,7 @@ def _has_inner_streams(system: DerivedSystem) -> bool:
     return system.status is StatusAccess.FRAMES or bool(system.status and system.tree)
 
 
-def _instances(system: DerivedSystem, names: Names) -> Context:
+def _instances(names: Names, system: DerivedSystem) -> Context:
     channels = (*system.subscribers, *system.publishers)
     return {
         "tree": bool(system.tree),
@@ -231,6 +246,10 @@ def _instances(system: DerivedSystem, names: Names) -> Context:
             {"register": endpoint_register(number, word), "signal": names.exchange(word), "bit": number}
             for number in range(len(system.exchange.ends) if system.exchange else 0)
             for word in ENDPOINT_WORDS
+        ],
+        "parameters": [
+            {"number": item.number, **{word: names.parameter(item, word) for word in ("wanted", "value")}}
+            for item in system.parameters
         ],
         "time_stamps": system.has_time_stamps,
         "host_tid": "open" if system.link or system.network else "m_axis_tid",

@@ -21,7 +21,7 @@ from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelera
 from fusesoc_firm.system.scaffold.pass_through import Wires, wires_of
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
 from fusesoc_firm.system.scaffold.stream_skeleton import STREAM_TEMPLATE, stream_function
-from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE, Pin
+from fusesoc_firm.system.written.specification import PYTHON, SOFTWARE
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 from fusesoc_firm.text.render import Context, render
 
@@ -126,7 +126,8 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
         for side in (*type_.inputs, *type_.outputs)
     }
     pins = type_.accelerator.pins
-    names = distinct_identifiers(((name,) for name in _SIGNALS), [str(pin.name) for pin in pins])
+    own_ports = [*(str(pin.name) for pin in pins), *(item.name for item in type_.parameters)]
+    names = distinct_identifiers(((name,) for name in _SIGNALS), own_ports)
     own = dict(zip(_SIGNALS, names, strict=True))
     wires = wires_of(type_)
     gives = [_given(number, side, of_side[side.prefix], wires[number]) for number, side in enumerate(type_.outputs)]
@@ -136,7 +137,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
     return {
         **own,
         "entity": identifier(type_.accelerator.name),
-        "sides": _declarations(type_, of_side, pins, language),
+        "sides": _declarations(type_, of_side, language),
         "takes": takes,
         "output_count": max(1, len(type_.outputs)),
         "gives": gives,
@@ -150,10 +151,8 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
     }
 
 
-def _declarations(
-    type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
-) -> list[Context]:
-    """Return the port declarations of all sides and pins for the entity or module."""
+def _declarations(type_: AcceleratorType, of_side: dict[str, list[SidePort]], language: _Language) -> list[Context]:
+    """Return the port declarations of all sides, pins and parameters for the entity or module."""
     groups = [
         (
             f"{side.frame.message}",
@@ -161,8 +160,11 @@ def _declarations(
         )
         for side in (*type_.inputs, *type_.outputs)
     ]
-    if pins:
+    if pins := type_.accelerator.pins:
         groups.append(("pins", [(str(pin.name), pin.direction == "out", pin.bits, "") for pin in pins]))
+    if type_.parameters:
+        ports = [(item.name, False, item.port_bits, item.type.name) for item in type_.parameters]
+        groups.append(("parameters, which change between messages", ports))
     declared = [port for _, ports in groups for port in ports]
     names = max((len(name) for name, *_ in declared), default=0)
     types = max((len(language.type(bits)) for *_, bits, _ in declared), default=0) if language.has_types_first else 0

@@ -69,6 +69,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 "sources": [str(source) for source in block.type.accelerator.sources],
                 **_domain(system, block),
                 **_pins(block, pins),
+                **_parameters(block),
             }
             for block in system.accelerators
         ],
@@ -171,6 +172,15 @@ def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict
         for pin in block.type.accelerator.pins
     ]
     return {"pins": pins} if pins else {}
+
+
+def _parameters(block: AcceleratorBlock) -> dict[str, Any]:
+    """Return the parameters of a block."""
+    parameters = [
+        {"name": item.name, "type": item.type.name, "default": item.default, "range": item.range}
+        for item in block.type.parameters
+    ]
+    return {"parameters": parameters} if parameters else {}
 
 
 def _software(system: DerivedSystem) -> dict[str, Any]:

@@ -81,6 +81,8 @@ FABRIC, HOST, BOTH = DELIVERIES = ("fabric", "host", "both")
 PASS = "pass"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+# The types of an accelerator's parameters: numbers that fit a register of the status.
+PARAMETER_TYPES = ("bool", "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32")
 NUMBERS = ("float32", "float64")
 """The floats of an accelerator in Python; fixed-point numbers are another choice."""
 VHDL_93, VHDL_2008 = VHDL_STANDARDS = (93, 2008)
@@ -321,6 +323,19 @@ class Pin(Section):
 
 
 @dataclass(frozen=True)
+class ParameterSection(Section):
+    """A number that ROS sets at run time: an input port of an accelerator, which changes between messages only."""
+
+    name: Text = key("the port's name; the parameter of the node is <block>.<name>", is_required=True)
+    type: Text = key("the number's type", is_required=True, choices=PARAMETER_TYPES)
+    default: Text = key("the value after reset", is_required=True)
+    range: tuple[Text, ...] = key(
+        "the least and the most value, such as [0, 10] (default: all of the type, for float32 all finite ones)",
+        form="texts",
+    )
+
+
+@dataclass(frozen=True)
 class Resources(Section):
     """The operators of an accelerator in Python: how many operations of a kind may run at the same time.
 
@@ -356,6 +371,12 @@ class Accelerator(Section):
         "width in bits of the accelerator's streams (default: the project's width)", form="integer", choices=WIDTHS
     )
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
+    parameters: tuple[ParameterSection, ...] = key(
+        "numbers that ROS sets at run time, as input ports of an accelerator in VHDL or Verilog",
+        form="sections",
+        section=ParameterSection,
+        is_asked=False,
+    )
     numbers: Text | None = key(
         "float32, float64 or fixed(W, F): all floats of an accelerator in Python (default: the types of the fields)",
         rule=numbers_fault,

@@ -15,6 +15,7 @@ from tests.cores.crossing_paths import Crossed, Domains, Names, crossing_paths
 from tests.hdl.ghdl import Library, core_files
 from tests.system.simulated.systems import DATA, HARDWARE, generate_system
 from tests.system.simulated.test_clock_domains import block, pass_through, project
+from tests.system.simulated.test_parameters import specification as with_parameters
 from tests.system.simulated.test_variable_system import converter
 
 POINT, POSE, TEXT = "geometry_msgs/Point", "geometry_msgs/Pose", "std_msgs/String"
@@ -125,6 +126,23 @@ def test_each_path_between_clocks_has_its_own_constraint(tmp_path: Path) -> None
     # Two streams: there and back.
     assert text.count("set_bus_skew ") == 4
     assert "-from [get_clocks" not in text
+
+
+def test_each_path_of_a_parameter_has_its_own_constraint(tmp_path: Path) -> None:
+    """The constraints without a path are those of the messages, which tuned holds in registers of its own."""
+    files = generate_system(with_parameters(tmp_path, 8, "270 MHz"), tmp_path, "zynq7000")
+    Library("firm", tmp_path).analyse(core_files(*HARDWARE))
+    work = Library("work", tmp_path)
+    work.analyse(files)
+    verilog = work.synthesise("tuning_system", language="verilog")
+    domains = Domains({"clk": "clk", "clk_own": "fast"}, lambda port: "outside" if port == "rst_n" else "clk")
+    paths = crossing_paths(verilog, "tuning_system", tmp_path, domains)
+    constraints = read((tmp_path / "zynq7000.xdc").read_text(encoding="utf-8"))
+    covered = [{path for path in paths if item.covers(path)} for item in constraints]
+    assert paths == set().union(*covered)
+    of_parameters = [own for item, own in zip(constraints, covered, strict=True) if "u_block_gain_" in item.source]
+    assert len(of_parameters) == 6
+    assert all(of_parameters)
 
 
 @pytest.mark.parametrize("what", ["-from", "-to"])
