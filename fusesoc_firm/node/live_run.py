@@ -12,11 +12,13 @@ from pathlib import Path
 from types import FrameType
 
 from fusesoc_firm.node.engine.carrier import CarrierError, RosCarrier, RosOptions
+from fusesoc_firm.node.engine.hardware_parameters import HardwareParameters
 from fusesoc_firm.node.engine.queues import Overflow
 from fusesoc_firm.node.engine.software import node_software
 from fusesoc_firm.node.engine.trace import Trace
 from fusesoc_firm.node.interface.description import NodeDescription
 from fusesoc_firm.node.interface.options import ROS_ARGUMENTS
+from fusesoc_firm.node.interface.parameters import parameters_of
 from fusesoc_firm.node.interface.services import NodeService
 from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.reopening import checked, status_registers
@@ -62,21 +64,39 @@ def run_options(
         hint = "nodes of ROS 1 have no lifecycle states; omit --lifecycle"
         fail("'--lifecycle' is for ROS 2, but the topics use ROS 1", hint=hint)
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
+    name = arguments.name or description.name
+    parameters = _hardware_parameters(description, versions, name, passed)
     return RunOptions(
         versions,
         RosOptions(
-            arguments.name or description.name,
+            name,
             tuple(passed),
             arguments.queue,
             None if arguments.qos is None else arguments.qos == RELIABLE,
             arguments.trace is not None,
             arguments.ros_python,
             arguments.lifecycle,
+            dict(parameters.values),
         ),
-        NodeSettings(arguments.queue, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
+        NodeSettings(
+            arguments.queue,
+            Overflow(arguments.overflow),
+            drain=arguments.drain,
+            restarts=arguments.restart,
+            parameters=parameters,
+        ),
         arguments.trace,
         arguments.status,
     )
+
+
+def _hardware_parameters(
+    description: NodeDescription, versions: Sequence[int], name: str, arguments: Sequence[str]
+) -> HardwareParameters:
+    """Return the parameters of the hardware with the values that ROS has for them. May raise `InputError`."""
+    known = {item.name for item in description.parameters}
+    values = parameters_of(versions, name, arguments, _say, known) if known else {}
+    return HardwareParameters(description.parameters, values)
 
 
 def run_node(
@@ -99,7 +119,13 @@ def run_node(
             )
             registers = status_registers(description, options.status, address)
             settings = replace(options.settings, report=_say, registers=registers)
-            node = Node(description, checked(open_transport, description, registers), settings, software, trace)
+            node = Node(
+                description,
+                checked(open_transport, description, registers, settings.parameters),
+                settings,
+                software,
+                trace,
+            )
             # Published messages are sent before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)

@@ -29,7 +29,18 @@ from fusesoc_firm.frame.faults import Fault, told
 from fusesoc_firm.node.actions.actions import NodeActions
 from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError, BurstJoiner, JoinedFrame
 from fusesoc_firm.node.engine.calls import NodeCalls
-from fusesoc_firm.node.engine.carrier import Answered, Called, Carrier, CarrierError, Event, Lost, Published, Taken
+from fusesoc_firm.node.engine.carrier import (
+    Answered,
+    Called,
+    Carrier,
+    CarrierError,
+    Event,
+    Lost,
+    Published,
+    Taken,
+    Wanted,
+)
+from fusesoc_firm.node.engine.hardware_parameters import HardwareParameters
 from fusesoc_firm.node.engine.queues import ClosedError, Overflow, SubscriberQueues
 from fusesoc_firm.node.engine.software import NodeSoftware
 from fusesoc_firm.node.engine.trace import Entry, Trace
@@ -97,7 +108,7 @@ class NodeSettings:
     After a stop request, the node processes received messages until the hardware has been silent for `settle` seconds
     and does not report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
     `report` receives messages to the user, and `watch` records all messages. `registers` are those of the hardware's
-    status, if frames do not read it.
+    status, if frames do not read it. `parameters` are the values of the accelerators' parameters.
     """
 
     depth: int | None = None
@@ -108,6 +119,7 @@ class NodeSettings:
     report: Callable[[str], None] = print
     watch: Watch | None = None
     registers: StatusRegisters | None = None
+    parameters: HardwareParameters | None = None
 
 
 @dataclass(frozen=True)
@@ -266,6 +278,25 @@ class Node:
         """Whether the node has access to a status of the hardware."""
         return bool(self._status or self._settings.registers)
 
+    def _access(self, request: bytes, seconds: float = ANSWER_SECONDS) -> int:
+        """Return the word of the answer to a request of the status. May raise `TransportError`."""
+        answer = answered(self.access_status(request, seconds))
+        if answer is None:
+            raise TransportError(NO_ANSWER)
+        return answer[1]
+
+    def _set_parameters(self, wanted: Wanted) -> None:
+        known = self._settings.parameters
+        wanted.answer(known.set(wanted.values, self._access) if known else "the hardware has no parameters")
+
+    def _restore_parameters(self) -> None:
+        """Set the parameters after the hardware has reset itself."""
+        try:
+            if self._settings.parameters:
+                self._settings.parameters.restore(self._access)
+        except TransportError as error:
+            self._report(f"parameters of the hardware are at their defaults: {error}")
+
     def _put_status_request(self, request: bytes) -> None:
         try:
             is_there = self._queues.put(len(self._inputs), _Message(len(self._inputs), request, None), 0.0)
@@ -314,9 +345,7 @@ class Node:
             carrier.diagnose(report)
 
     def _read_word(self, address: int) -> int:
-        answer = answered(self.access_status(read_request(address), INTERVAL_SECONDS))
-        assert answer
-        return answer[1]
+        return self._access(read_request(address), INTERVAL_SECONDS)
 
     def _count_rest(self) -> None:
         self._is_counted = True
@@ -343,6 +372,9 @@ class Node:
             self._note_published(event)
         elif isinstance(event, Lost):
             self._note_lost(event)
+        elif isinstance(event, Wanted):
+            # The answer of the hardware must not wait for messages that this thread takes.
+            self._start(partial(self._set_parameters, event))
         elif isinstance(event, Called):
             if not self._actions.called(event):
                 self._calls.called(event)
@@ -484,6 +516,8 @@ class Node:
                 continue
             except TransportResetError as reset:
                 self._forget(hardware.transport, str(reset))
+                # This thread passes on the answers.
+                self._start(self._restore_parameters)
                 continue
             except TransportError as error:
                 if not self._begin_anew(hardware, error):

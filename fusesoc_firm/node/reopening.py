@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from fusesoc_firm.node.engine.hardware_parameters import HardwareParameters
 from fusesoc_firm.node.interface.description import NodeDescription
 from fusesoc_firm.node.node import HardwareListener, OpenTransport
-from fusesoc_firm.node.status.status import check_digest
+from fusesoc_firm.node.status.status import access, check_digest
 from fusesoc_firm.node.transport.built_simulator import BuiltSimulator
 from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import (
@@ -57,29 +58,52 @@ def status_registers(description: NodeDescription, address: str, transport: str)
 
 
 def checked(
-    open_transport: OpenTransport, description: NodeDescription, registers: StatusRegisters | None = None
+    open_transport: OpenTransport,
+    description: NodeDescription,
+    registers: StatusRegisters | None = None,
+    parameters: HardwareParameters | None = None,
 ) -> OpenTransport:
     """Return a function that opens a transport, and raises `TransportError` if the hardware is another system's.
 
-    `registers` are those of the status, if frames do not read it. Without a status, the hardware is not checked.
+    `registers` are those of the status, if frames do not read it. Without a status, the hardware is not checked. The
+    function sets the `parameters` of the hardware, which begins with the defaults.
     """
     if registers:
-        return _checked_before(open_transport, description, registers)
-    return _checked_by_frames(open_transport, description) if description.has_status_frames else open_transport
+        return _checked_before(open_transport, description, registers, parameters)
+    if description.has_status_frames:
+        return _checked_by_frames(open_transport, description, parameters)
+    return open_transport
 
 
 def _checked_before(
-    open_transport: OpenTransport, description: NodeDescription, registers: StatusRegisters
+    open_transport: OpenTransport,
+    description: NodeDescription,
+    registers: StatusRegisters,
+    parameters: HardwareParameters | None,
 ) -> OpenTransport:
     def opened(listener: HardwareListener) -> Transport:
         # Opening the transport would reset the hardware of another system.
         check_digest(registers, description.digest, description.name)
-        return open_transport(listener)
+        transport = open_transport(listener)
+        _restore(parameters, registers, transport)
+        return transport
 
     return opened
 
 
-def _checked_by_frames(open_transport: OpenTransport, description: NodeDescription) -> OpenTransport:
+def _restore(parameters: HardwareParameters | None, status: Transport, transport: Transport) -> None:
+    """Set parameters through the transport of the status; on failure, close the other one."""
+    try:
+        if parameters:
+            parameters.restore(partial(access, status))
+    except BaseException:
+        transport.close()
+        raise
+
+
+def _checked_by_frames(
+    open_transport: OpenTransport, description: NodeDescription, parameters: HardwareParameters | None
+) -> OpenTransport:
     def opened(listener: HardwareListener) -> Transport:
         late = _LateListener(listener)
         transport = open_transport(late)
@@ -88,6 +112,7 @@ def _checked_by_frames(open_transport: OpenTransport, description: NodeDescripti
         except BaseException:
             transport.close()
             raise
+        _restore(parameters, transport, transport)
         late.listens = True
         return transport
 

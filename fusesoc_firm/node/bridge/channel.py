@@ -21,6 +21,9 @@ LOST = b"L"
 # CALL, from the bridge: a call of the hardware's service; to the bridge: a call by the hardware. ANSWER, the other way:
 # the answer to a call. The topic is the number of the service.
 CALL, ANSWER = b"Q", b"A"
+# PARAMETERS, from the bridge: new values of parameters, as JSON with the number of the request; to the bridge: the
+# reason why they are refused, or an empty text, in the same form.
+PARAMETERS = b"V"
 # The number of the topic `/diagnostics`.
 DIAGNOSTICS = 0xFFFF
 # STOP, to the bridge: accept no more messages. From the bridge: ROS requests the end of the node.

@@ -16,7 +16,19 @@ import sys
 import threading
 import time
 
-from .channel import ANSWER, CALL, CONFIGURE, DIAGNOSTICS, FAULT, MESSAGE, PUBLISHED, STOP, Channel, unpack_call
+from .channel import (
+    ANSWER,
+    CALL,
+    CONFIGURE,
+    DIAGNOSTICS,
+    FAULT,
+    MESSAGE,
+    PARAMETERS,
+    PUBLISHED,
+    STOP,
+    Channel,
+    unpack_call,
+)
 from .ros import Ros
 from .ros1 import Ros1
 from .ros2 import Ros2
@@ -38,6 +50,8 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
             ros.answer(parcel.topic, parcel.data)
         elif parcel.kind == CALL:
             ros.call(parcel.topic, *unpack_call(parcel.data))
+        elif parcel.kind == PARAMETERS:
+            ros.parameters_set(parcel.data)
         elif parcel.kind == STOP:
             ros.stop()
     ros.end()

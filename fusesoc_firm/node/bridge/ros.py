@@ -5,18 +5,21 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import queue
 import sys
 import threading
 import time
 from abc import ABC, abstractmethod
 from typing import Any
 
-from .channel import ANSWER, CALL, LOST, MESSAGE, READY, Channel, pack_answer, pack_call, unpack_answer
+from .channel import ANSWER, CALL, LOST, MESSAGE, PARAMETERS, READY, Channel, pack_answer, pack_call, unpack_answer
 
 # The maximum time in s to wait until published messages have been sent.
 FLUSH_SECONDS = 2.0
 # The interval in s at which the types of other nodes' topics are compared.
 LOOK_SECONDS = 1.0
+# The time in s that the engine has to set parameters.
+PARAMETER_SECONDS = 10.0
 # The name of a node of which ROS 2 has found only the topics so far.
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 
@@ -76,6 +79,29 @@ class Ros(ABC):
         # The unanswered calls of the hardware's services, by number.
         self._asked: dict[int, Any] = {}
         self._call_numbers = itertools.count()
+        # The requests to set parameters without an answer, by number.
+        self._wanted: dict[int, queue.Queue[str]] = {}
+
+    def set_parameters(self, values: dict[str, Any]) -> str:
+        """Let the engine set parameters; return the reason of a refusal, or an empty text."""
+        self._is_ready.wait()
+        number = next(self._call_numbers)
+        answer = self._wanted[number] = queue.Queue()
+        try:
+            self._channel.send(PARAMETERS, data=json.dumps({"number": number, "values": values}).encode())
+            return answer.get(timeout=PARAMETER_SECONDS)
+        except OSError:
+            return "the node is ending"
+        except queue.Empty:
+            return "the hardware did not answer"
+        finally:
+            del self._wanted[number]
+
+    def parameters_set(self, data: bytes) -> None:
+        """Pass on the engine's answer to `set_parameters`."""
+        answer = json.loads(data)
+        if answer["number"] in self._wanted:
+            self._wanted[answer["number"]].put(answer["reason"])
 
     def ask(self, service: int, payload: bytes, asker: Any) -> bool:
         """Hand over a call of the hardware's service; return whether it will be answered, through `asker`."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from .channel import DIAGNOSTICS, DONE, STOP, Channel
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, Gaps, Ros, type_report
+from .ros1_parameters import Watch
 from .ros1_services import Caller, raw_service
 
 
@@ -30,6 +31,8 @@ class Ros1(Ros):
         # rospy's reports of refused peers.
         logging.getLogger("rosout").addFilter(_Once())
         rospy.on_shutdown(self._stopped_by_ros)
+        if config["parameters"]:
+            Watch(rospy, config["parameters"], self.set_parameters, self._ended).start()
         given = [*config["publishers"], config["diagnostics"]]
         self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in given}
         self._publishers = {

@@ -11,6 +11,7 @@ from typing import Any
 from .channel import DIAGNOSTICS, DONE, STOP, Channel
 from .managed import managed_node, waiting_group
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, BridgeError, Ends, Gaps, Ros, type_report
+from .ros2_parameters import declare
 from .ros2_types import SERVICE_DEPTH, message_class, service_class
 
 # The calls of a service that may be answered late.
@@ -32,6 +33,7 @@ class Ros2(Ros):
         # A node with lifecycle states carries messages, calls and goals only while it is active.
         self._is_active = not config["is_managed"]
         self._node = rclpy.create_node(config["name"]) if self._is_active else self._managed(config["name"])
+        declare(self._node, config["parameters"], self.set_parameters)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         # The number of callbacks so far.

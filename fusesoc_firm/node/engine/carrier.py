@@ -9,12 +9,12 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import asdict, dataclass, field
+from functools import cache, partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from fusesoc_firm.node.bridge import channel as bridge
 from fusesoc_firm.node.engine.ros_wheels import ros_python
@@ -100,7 +100,15 @@ class Answered:
     answer: Answer
 
 
-Event = Taken | Published | Lost | Called | Answered
+@dataclass(frozen=True)
+class Wanted:
+    """New values of parameters; `answer` takes the reason why they are refused, or an empty text."""
+
+    values: Mapping[str, Any]
+    answer: Callable[[str], None]
+
+
+Event = Taken | Published | Lost | Called | Answered | Wanted
 
 
 class Carrier(Protocol):
@@ -140,7 +148,8 @@ class RosOptions:
 
     `arguments` are arguments to ROS, such as remappings. `depth`, in messages, and `is_reliable` are for all topics; if
     they are None, each topic has its own. `python` is the interpreter for which ROS is installed; if it is None, the
-    carrier searches for an interpreter. With `is_managed`, a node of ROS 2 has lifecycle states.
+    carrier searches for an interpreter. With `is_managed`, a node of ROS 2 has lifecycle states. `parameters` are the
+    first values of the hardware's parameters.
     """
 
     name: str
@@ -150,6 +159,7 @@ class RosOptions:
     is_timed: bool = False
     python: str | None = None
     is_managed: bool = False
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
 
 class RosCarrier:
@@ -192,6 +202,7 @@ class RosCarrier:
             "publishers": _numbered(ros, description.given_topics, len(description.publishers), options),
             "services": _services(ros, description.all_services),
             "groups": [*_groups(ros, description)],
+            "parameters": [*_parameters(description, options)],
             "diagnostics": {"number": bridge.DIAGNOSTICS, **asdict(diagnostics_topic(ros))},
         }
         try:
@@ -232,8 +243,8 @@ class RosCarrier:
                     yield Published(parcel.topic, parcel.time_ns)
                 elif parcel.kind == bridge.LOST:
                     yield Lost(parcel.topic, int(parcel.data))
-                elif parcel.kind in (bridge.CALL, bridge.ANSWER):
-                    yield _event_of_service(parcel)
+                elif parcel.kind in (bridge.CALL, bridge.ANSWER, bridge.PARAMETERS):
+                    yield self._request(parcel)
                 elif parcel.kind == bridge.DONE:
                     self._stopped.set()
                 elif parcel.kind == bridge.STOP:
@@ -256,6 +267,15 @@ class RosCarrier:
     def answer(self, service: int, number: int, answer: Answer) -> None:
         """Answer a call."""
         self._send(bridge.ANSWER, service, bridge.pack_answer(number, answer.payload, answer.reason))
+
+    def _request(self, parcel: bridge.Parcel) -> Called | Answered | Wanted:
+        if parcel.kind != bridge.PARAMETERS:
+            return _event_of_service(parcel)
+        request = json.loads(parcel.data)
+        return Wanted(request["values"], partial(self._answer_parameters, request["number"]))
+
+    def _answer_parameters(self, number: int, reason: str) -> None:
+        self._send(bridge.PARAMETERS, data=json.dumps({"number": number, "reason": reason}).encode())
 
     def diagnose(self, report: Report) -> None:
         """Publish a report on `/diagnostics`."""
@@ -312,6 +332,20 @@ def _numbered(ros: int, topics: Sequence[NodeTopic], blocks: int, options: RosOp
         for number, topic in enumerate(topics)
         if topic.ros == ros
     ]
+
+
+def _parameters(description: NodeDescription, options: RosOptions) -> Iterator[dict[str, object]]:
+    """Yield the parameters with the values in effect."""
+    for item in description.parameters:
+        parameter = item.parameter
+        yield {
+            "name": item.name,
+            "type": parameter.type.name,
+            "value": options.parameters.get(item.name, parameter.default),
+            "least": parameter.least,
+            "most": parameter.most,
+            "description": f"{parameter.type.name} of the accelerator '{item.block}': {parameter.range}",
+        }
 
 
 def _groups(ros: int, description: NodeDescription) -> Iterator[dict[str, list[int]]]:

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field, replace
 from fusesoc_firm.accelerator.software import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.frame.content import Content, content_of
 from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT
 from fusesoc_firm.node.interface.action_types import NodeAction, node_action
 from fusesoc_firm.node.interface.services import NodeService, node_service
 from fusesoc_firm.node.interface.topics import NodeTopic, node_topic
-from fusesoc_firm.system.derived.model import Converter, StatusAccess, Topic
+from fusesoc_firm.system.derived.model import BlockParameter, Converter, Parameter, StatusAccess, Topic
 from fusesoc_firm.system.system_core import LoadedSystem, identity
 from fusesoc_firm.text.diagnostics import fail
 
@@ -39,7 +40,7 @@ class NodeDescription:
     hardware takes, by block. `longest_payload` is the size in bytes of the longest payload from
     any publisher, or None without a bound. `clock_hz` is None if the specification has no clock. `digest` is that of
     the hardware's identity, or empty if the hardware has no status. With `has_status_registers`, the status is a port
-    for AXI4-Lite; otherwise frames read it.
+    for AXI4-Lite; otherwise frames read it. `parameters` are those of the accelerators.
     """
 
     name: str
@@ -56,6 +57,7 @@ class NodeDescription:
     services: tuple[NodeService, ...] = ()
     actions: tuple[NodeAction, ...] = ()
     has_status_registers: bool = False
+    parameters: tuple[BlockParameter, ...] = ()
 
     @property
     def taken_topics(self) -> tuple[NodeTopic, ...]:
@@ -135,7 +137,16 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         tuple(node_service(item, loaded) for item in system.services),
         tuple(node_action(item, loaded) for item in system.actions),
         has_status_registers=system.status is StatusAccess.AXI_LITE,
+        parameters=system.parameters,
     )
+
+
+def hardware_parameters(
+    *parameters: tuple[str, str, str, float, float, float],
+) -> tuple[BlockParameter, ...]:
+    """Return the parameters of a system from block, name, type, default, and the least and the most value of each."""
+    made = ((block, Parameter(name, INTEGER_AND_FLOAT[type_], *values)) for block, name, type_, *values in parameters)
+    return tuple(BlockParameter(number, *each) for number, each in enumerate(made))
 
 
 def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:

@@ -13,7 +13,7 @@ import os
 import re
 import time
 import xmlrpc.client
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -36,10 +36,15 @@ Parameters = dict[str, Any]
 
 
 def parameters_of(
-    versions: Sequence[int], name: str, arguments: Sequence[str], report: Callable[[str], None]
+    versions: Sequence[int],
+    name: str,
+    arguments: Sequence[str],
+    report: Callable[[str], None],
+    known: Collection[str] = PARAMETERS,
 ) -> Parameters:
-    """Return the parameters of the node called `name` that are set, with `arguments` to ROS.
+    """Return the parameters of the node called `name` that are `known` and set, with `arguments` to ROS.
 
+    The parts of a name are separated by dots, in ROS 1 also by slashes.
     With ROS 1, wait for the master; and call `report` once. Raise `InputError` for an invalid argument or file.
     """
     found: Parameters = {}
@@ -47,7 +52,17 @@ def parameters_of(
         found |= _of_master(name, arguments, report)
     if 2 in versions:
         found |= _of_arguments(name, arguments)
-    return {key: value for key, value in found.items() if key in PARAMETERS}
+    return {key: value for key, value in _flat(found) if key in known}
+
+
+def _flat(values: Parameters, above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested mappings with their full names."""
+    for key, value in values.items():
+        name = f"{above}{str(key).replace('/', '.')}"
+        if isinstance(value, dict):
+            yield from _flat(value, f"{name}.")
+        else:
+            yield name, value
 
 
 def option_words(parameters: Parameters) -> list[str]:

@@ -15,6 +15,7 @@ from fusesoc_firm.node.interface.description import NodeDescription, describe
 from fusesoc_firm.node.interface.services import NodeService
 from fusesoc_firm.node.interface.topics import NodeTopic
 from fusesoc_firm.node.package.launch import LAUNCHERS, launch_file, package_name
+from fusesoc_firm.system.derived.model import BlockParameter
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import identifier
@@ -98,10 +99,17 @@ def _table(description: NodeDescription) -> dict[str, Any]:
         "clock_hz": repr(description.clock_hz),
         "digest": description.digest,
         "has_status_registers": description.has_status_registers,
+        "parameters": [*map(_parameter, description.parameters)],
         "services": [*map(_service, description.services)],
         "has_services": bool(description.all_services),
         "actions": [*map(_action, description.actions)],
     }
+
+
+def _parameter(item: BlockParameter) -> dict[str, str]:
+    found = item.parameter
+    values = (found.type.name, found.default, found.least, found.most)
+    return {"block": item.block, "name": found.name, "values": ", ".join(map(repr, values))}
 
 
 def _topic(topic: NodeTopic) -> dict[str, Any]:

@@ -26,6 +26,16 @@ BYTES = 8
 """The distance of the registers of two parameters."""
 
 
+def wanted_address(number: int) -> int:
+    """Return the address of the register with the word that software wants."""
+    return WANTED_ADDRESS + BYTES * number
+
+
+def value_address(number: int) -> int:
+    """Return the address of the register with the word in effect."""
+    return VALUE_ADDRESS + BYTES * number
+
+
 def parameter_registers(parameters: tuple[BlockParameter, ...]) -> list[Context]:
     """Return the registers of parameters for the description of a status."""
     return [
@@ -34,8 +44,8 @@ def parameter_registers(parameters: tuple[BlockParameter, ...]) -> list[Context]
             "name": item.name,
             "range": item.parameter.range,
             "type": item.parameter.type.name,
-            "wanted": f"{WANTED_ADDRESS + BYTES * item.number:03x}",
-            "value": f"{VALUE_ADDRESS + BYTES * item.number:03x}",
+            "wanted": f"{wanted_address(item.number):03x}",
+            "value": f"{value_address(item.number):03x}",
             "default": f"{item.parameter.word(item.parameter.default):08x}",
         }
         for item in parameters

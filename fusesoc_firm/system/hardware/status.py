@@ -126,7 +126,7 @@ def status_description(
                 {
                     "register": _network_register(name),
                     "title": f"Times that {meaning}",
-                    "address": f"{_NETWORK_ADDRESS + 4 * number:x}",
+                    "address": f"{_NETWORK_ADDRESS + 4 * number:03x}",
                 }
                 for number, (name, meaning) in enumerate(NETWORK_FAULTS.items())
             ]
@@ -137,7 +137,7 @@ def status_description(
                 {
                     "register": endpoint_register(number, word),
                     "title": f"{meaning}, endpoint {number}",
-                    "address": f"{_EXCHANGE_ADDRESS + number * _ENDPOINT_BYTES + 4 * place:x}",
+                    "address": f"{_EXCHANGE_ADDRESS + number * _ENDPOINT_BYTES + 4 * place:03x}",
                 }
                 for number in range(features.endpoints)
                 for place, (word, meaning) in enumerate(ENDPOINT_WORDS.items())
@@ -149,7 +149,7 @@ def status_description(
                     "number": number,
                     "low": 32 * number,
                     "word": digits[len(digits) - (number + 1) * _WORD_DIGITS : len(digits) - number * _WORD_DIGITS],
-                    "address": f"{DIGEST_ADDRESS + 4 * number:x}",
+                    "address": f"{DIGEST_ADDRESS + 4 * number:03x}",
                 }
                 for number in range(DIGEST_WORDS)
             ],

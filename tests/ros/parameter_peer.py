@@ -1,0 +1,120 @@
+"""Sets parameters of a node, and sends numbers to it, as other nodes of ROS do. The Python of ROS runs it.
+
+The arguments are the version of ROS, the node's name and steps in JSON: ["set", NAME, VALUE], ["get", NAME] or ["ask",
+NUMBER]. It prints the list of results in JSON: of `set`, the reason of a refusal.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import threading
+import time
+from queue import Empty, Queue
+from typing import Any
+
+_SECONDS = 30.0
+
+
+class Peer1:
+    """A node of ROS 1."""
+
+    def __init__(self, node: str) -> None:
+        import rospy
+        from std_msgs.msg import Int32
+
+        self._rospy, self._node, self._message = rospy, node, Int32
+        self._answers: Queue[Any] = Queue()
+        rospy.init_node("peer", anonymous=True)
+        self._publisher = rospy.Publisher("sub", Int32, queue_size=10)
+        rospy.Subscriber("pub", Int32, self._answers.put)
+        while not self._publisher.get_num_connections():
+            time.sleep(0.01)
+        time.sleep(0.5)
+
+    def set(self, name: str, value: Any) -> str:
+        """Set a parameter in the master; the node puts back a value that it refuses."""
+        key = f"{self._node}/{name.replace('.', '/')}"
+        self._rospy.set_param(key, value)
+        time.sleep(1.5)
+        return "" if self._rospy.get_param(key) == value else "put back"
+
+    def get(self, name: str) -> Any:
+        """Return a parameter in the master."""
+        return self._rospy.get_param(f"{self._node}/{name.replace('.', '/')}")
+
+    def ask(self, number: int) -> Any:
+        """Send a number; return the answer."""
+        self._publisher.publish(self._message(number))
+        return self._answers.get(timeout=_SECONDS).data
+
+
+class Peer2:
+    """A node of ROS 2."""
+
+    def __init__(self, node: str) -> None:
+        import rclpy
+        from rclpy.parameter import Parameter
+        from rclpy.parameter_client import AsyncParameterClient
+        from std_msgs.msg import Int32
+
+        self._rclpy, self._message, self._parameter = rclpy, Int32, Parameter
+        self._answers: Queue[Any] = Queue()
+        rclpy.init()
+        self._own = rclpy.create_node("peer")
+        self._publisher = self._own.create_publisher(Int32, "sub", 10)
+        self._own.create_subscription(Int32, "pub", self._answers.put, 10)
+        self._client = AsyncParameterClient(self._own, node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+        assert self._client.wait_for_services(_SECONDS)
+        while not self._publisher.get_subscription_count():
+            time.sleep(0.01)
+        time.sleep(0.5)
+
+    def _spin(self) -> None:
+        from rclpy.executors import ExternalShutdownException
+
+        with contextlib.suppress(ExternalShutdownException):
+            self._rclpy.spin(self._own)
+
+    def _done(self, future: Any) -> Any:
+        end = time.monotonic() + _SECONDS
+        while not future.done() and time.monotonic() < end:
+            time.sleep(0.005)
+        return future.result()
+
+    def set(self, name: str, value: Any) -> str:
+        """Set a parameter; return the reason of a refusal."""
+        answer = self._done(self._client.set_parameters([self._parameter(name, value=value)]))
+        return answer.results[0].reason if not answer.results[0].successful else ""
+
+    def get(self, name: str) -> Any:
+        """Return a parameter."""
+        from rclpy.parameter import parameter_value_to_python
+
+        return parameter_value_to_python(self._done(self._client.get_parameters([name])).values[0])
+
+    def ask(self, number: int) -> Any:
+        """Send a number; return the answer."""
+        self._publisher.publish(self._message(data=number))
+        return self._answers.get(timeout=_SECONDS).data
+
+
+def main() -> None:
+    """Carry out the steps."""
+    peer = (Peer1 if sys.argv[1] == "1" else Peer2)(sys.argv[2])
+    found = []
+    for verb, *values in json.loads(sys.argv[3]):
+        try:
+            found.append(getattr(peer, verb)(*values))
+        except Empty:
+            found.append("no answer")
+    print(json.dumps(found), flush=True)
+    # Threads of ROS may still wait.
+    os._exit(0)
+
+
+main()
