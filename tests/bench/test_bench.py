@@ -216,22 +216,24 @@ def test_loops_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_bitstream_has_the_figures_of_nextpnrs_report() -> None:
     cells = {"TRELLIS_COMB": {"used": 30}, "TRELLIS_FF": {"used": 20}, "DP16KD": {"used": 10}, "DCCA": {"used": 2}}
-    clocks = {"$glbnet$clk": {"achieved": 126.26, "constraint": 125.0}, "rx$O": {"achieved": 9, "constraint": 8}}
+    clocks = {"$glbnet$clk": {"achieved": 126.26, "constraint": 125.0}, "rx_clk$O": {"achieved": 9, "constraint": 8}}
     build = ("quat2euler_ethernet", "ecp5_versa")
-    row = bitstreams.row_of(*build, json.dumps({"fmax": clocks, "utilization": cells}))
-    assert row == (*build, "126.3", "30", "20", "10", "125", MET)
+    row = bitstreams.row_of(*build, json.dumps({"fmax": clocks, "utilization": cells}), 1_234_567)
+    assert row == (*build, "126.3", "30", "20", "10", "1235", "125", MET)
     # Without a measurement, a row stays.
-    empty = bitstreams.measure(print, "", "^nothing")
-    assert empty.rows == ((*build, "", "", "", "", "", NOT_MEASURED),)
-    written = str(replace(empty, rows=(row,)))
-    assert bitstreams.measure(print, written, "^nothing").rows == (row,)
+    empty, families = bitstreams.measure(print, "", "^nothing")
+    assert empty.rows[-1] == (*build, "", "", "", "", "", "", NOT_MEASURED)
+    assert families.rows[-1] == ("Lattice ECP5", "trellis", "", "", "", "", "", NOT_MEASURED)
+    written = str(replace(empty, rows=(*empty.rows[:-1], row)))
+    assert bitstreams.measure(print, written, "^nothing")[0].rows[-1] == row
 
 
 def test_a_bitstream_that_is_not_built_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """FuseSoC fails, as it does if a clock is too slow, and its last lines say why."""
     monkeypatch.setattr(bitstreams, "_BUILDS", (("quat2euler_ethernet", "nowhere"),))
+    monkeypatch.setattr(bitstreams, "OPEN_FLOWS", {})
     told: list[str] = []
-    table = bitstreams.measure(told.append)
+    table, _ = bitstreams.measure(told.append)
     assert any("nowhere" in line for line in told[:-1]), told
     assert [row[-1] for row in table.rows] == [FAILED]
     assert not table.is_good

@@ -17,6 +17,7 @@ from tools.bench import (
     actions,
     applications,
     area,
+    bitstreams,
     builds,
     codec,
     cycles,
@@ -64,8 +65,8 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing, network, noc, kernels, fuzz, loops, builds and actions: only rows whose names match, such as"
-        " 'Image.* 64 bits'; for live and studio: only tables",
+        help="for timing, network, noc, boards, kernels, fuzz, loops, builds, actions: only rows whose names match,"
+        " such as 'Image.* 64 bits'; for live and studio: only tables",
     )
     parser.add_argument(
         "--seeds",
@@ -107,6 +108,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "network": lambda: network.measure(
             Nextpnr(Yosys(), device=network.DEVICE), _tell, figures.written(), arguments.row, arguments.seeds
         ),
+        "boards": lambda: bitstreams.measure(_tell, figures.written(), arguments.row),
         "noc": lambda: noc.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
         "kernels": lambda: kernels.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
         "peers": lambda: peers.measure(Nextpnr(Yosys()), _tell, arguments.seeds),

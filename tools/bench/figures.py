@@ -9,11 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from tests.hdl.ghdl import REPOSITORY
 from tools.bench import (
     actions,
     applications,
     area,
+    bitstreams,
     builds,
     codec,
     cycles,
@@ -107,6 +109,7 @@ PAGES = (
         ("noc",),
     ),
     Page("network", "Figures of a node in fabric", "area and clock", ("network",)),
+    Page("boards", "Figures of boards", "clock and area of bitstreams, and what is done for each family", ("boards",)),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live", "resize")),
     Page("codec", "Figures of the codec", "the time of encoding and decoding in Python", ("codec",)),
     Page("studio", "Figures of firm studio", "how fast the page is", ("studio",)),
@@ -128,6 +131,7 @@ _HEADINGS = {
     "kernels": "Kernels",
     "noc": "Networks on chip",
     "network": "ROS 2 by Ethernet",
+    "boards": "Bitstreams",
     "systems": "Systems",
     "builds": "Builds",
     "actions": "Cached steps",
@@ -185,6 +189,8 @@ _METHODS = {
         `make bench BENCH='noc --row router'` measures only the rows whose names match.""",
     "network": f"""LUT4, FF and MHz are measured as in [Timing](timing.md#timing), with nextpnr's
         `{network.DEVICE}`.""",
+    "boards": f"""`make bench BENCH='boards --row obstacle'` measures only the rows whose names match. It installs
+        nothing: the extras {", ".join(OPEN_FLOWS)} have the programs, except Debian's Yosys.""",
     "systems": "The table lists the time to check and generate a large system.",
     "builds": "The table lists the time to generate many cores.",
     "actions": """The table lists the time of commands whose [steps are cached](../reference/actions.md).""",
@@ -234,6 +240,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         kernels,
         noc,
         network,
+        bitstreams,
         peers,
         systems,
         builds,
@@ -294,12 +301,13 @@ def _versions(part: str) -> str:
         others = codec.versions() if part == "codec" else []
         return ", ".join([f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}", *others])
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
-    if part == "images":
+    more = {"live": live.versions, "resize": live.versions, "simulators": simulators.versions}
+    if part == "boards":
+        tools += bitstreams.versions()
+    elif part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
-    elif part in ("live", "resize"):
-        tools += [_first_line("verilator"), *live.versions()]
-    elif part == "simulators":
-        tools += [_first_line("verilator"), *simulators.versions()]
+    elif part in more:
+        tools += [_first_line("verilator"), *more[part]()]
     elif part in ("area", "manager", "timing", "kernels", "noc", "network", "peers", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += (

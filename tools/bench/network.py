@@ -1,4 +1,4 @@
-"""Size and clock of a node of ROS 2 by Ethernet, placed and routed on an ECP5, and of whole systems on boards."""
+"""Size and clock of a node of ROS 2 by Ethernet, placed and routed on an ECP5."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.cores.test_net_link import NODE
 from tests.hdl.ghdl import Generic, Library, core_files
-from tools.bench import bitstreams, timing
+from tools.bench import timing
 from tools.bench.nextpnr import SEEDS, Nextpnr
 from tools.bench.tables import FAILED, NOT_MEASURED, Table, Tell, known_rows
 from tools.bench.timing import Design, Row
@@ -73,7 +73,7 @@ def longest_row() -> Row:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
-    return {TITLE: [row.key for row in rows()], LONGEST_TITLE: [longest_row().key], **bitstreams.keys()}
+    return {TITLE: [row.key for row in rows()], LONGEST_TITLE: [longest_row().key]}
 
 
 def measure(
@@ -83,7 +83,6 @@ def measure(
     return [
         *timing.measured_tables({TITLE: rows()}, {TITLE: _NOTE}, nextpnr, tell, written, pattern, seeds),
         _longest(nextpnr, tell, written, pattern, seeds),
-        bitstreams.measure(tell, written, pattern),
     ]
 
 
