@@ -31,6 +31,7 @@ OTHER_FAULTS = {
     ("message/library.py", "_bag"): "the file of a bag",
     ("message/library.py", "_check_equal"): "the file of a bag",
     ("system/boards/board.py", "read_board"): "the file of a board",
+    ("system/boards/board.py", "_check_keys"): "the file of a board",
     ("system/boards/board.py", "_check_pins"): "the file of a board",
     ("system/boards/board.py", "_check_ports"): "the file of a board",
     ("system/boards/board.py", "_pll"): "the file of a board",
