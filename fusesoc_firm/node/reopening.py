@@ -23,10 +23,10 @@ from fusesoc_firm.node.transport.simulator import (
 from fusesoc_firm.node.transport.status_registers import StatusRegisters, open_registers_at
 from fusesoc_firm.node.transport.transport import Transport, TransportError
 
-# After this many cycles without a beat, the simulation runs only at intervals. These suffice for accelerators that send
-# spontaneously or compute for longer. A simulation that never sleeps would use the processor time that an arriving
-# message needs.
-_PACE = Pace(rest_cycles=2_000, idle_seconds=0.05)
+# After this many cycles without a beat, or four of its own pauses, the simulation runs only at intervals. These suffice
+# for accelerators that send spontaneously or compute for longer. A simulation that never sleeps would use the processor
+# time that an arriving message needs.
+_PACE = Pace(rest_cycles=500, idle_seconds=0.05)
 
 
 def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -> OpenTransport:

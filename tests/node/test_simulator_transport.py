@@ -17,12 +17,12 @@ from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken, Waits
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
 
-# An echo: a frame is taken and comes back a cycle after it; of the bytes of a frame's payload, some are orders.
+# An echo: a frame is taken and comes back at once, or 1,000 cycles later; of the bytes of a frame, some are orders.
 _MODEL = """
 import os, struct, sys, time
 requests, reports = open(3, "rb"), open(4, "wb")
 cycle = quiet = counted = 0
-frames = []
+frames, late = [], []
 reports.write(b"V\\5")
 def say(*parts):
     reports.write(b"".join(parts))
@@ -42,7 +42,19 @@ while kind := requests.read(1):
             os.kill(os.getpid(), 9)
     elif kind == b"R":
         left = int.from_bytes(requests.read(4), "little")
-        if frames and frames[0].endswith(b"wait"):
+        if late:
+            ran = min(left, late[0])
+            cycle, quiet, late[0] = cycle + ran, quiet + ran, late[0] - ran
+            if not late[0]:
+                frame = late.pop()
+                late.clear()
+                say(b"B\\7\\0\\0", struct.pack("<QQI", cycle, cycle, len(frame)), frame)
+                cycle, quiet = cycle + 1, 0
+        elif frames and frames[0].endswith(b"late"):
+            late = [1000, frames.pop(0)]
+            say(b"T", struct.pack("<QQ", cycle, cycle))
+            cycle, quiet = cycle + 1, 0
+        elif frames and frames[0].endswith(b"wait"):
             cycle, quiet = cycle + left, quiet + left
         elif frames and left:
             frame = frames.pop(0)
@@ -194,6 +206,19 @@ def test_idle_stepping(model: list[str]) -> None:
         wait_until(lambda: transport.receive(0.01) is None and simulator.quiet >= 10)
         cycle = simulator.cycle
         wait_until(lambda: transport.receive(0.01) is None and simulator.cycle > cycle)
+
+
+def test_it_rests_later_if_the_system_pauses(model: list[str]) -> None:
+    """Four times as late as the answer to the first frame, for which it was woken."""
+    with (
+        Simulator(model) as simulator,
+        SimulatorTransport(lambda: simulator, Pace(rest_cycles=100, idle_seconds=0.01)) as transport,
+    ):
+        wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
+        transport.send(b"late")
+        assert received(transport) == b"late"
+        wait_until(lambda: transport.receive(0.01) is None and transport.is_at_rest())
+        assert simulator.quiet >= 4_000
 
 
 def test_a_sender_without_a_receiver_runs_it(transport: Transport) -> None:

@@ -49,6 +49,8 @@ _END_SECONDS = 10.0
 _STEP_SECONDS = 0.001
 _STEP_SHARE = 1 / 8
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
+# The system's pauses after which the simulator rests; more cycles would use the processor time of an arriving message.
+_PAUSES_TO_REST, _MOST_REST_CYCLES = 4, 100_000
 _PIECE_BYTES = 2**16
 # The longest wait of `poll`, in ms.
 _MOST_POLLED = 2**31 - 1
@@ -309,9 +311,10 @@ class Pace:
     """The settings with which a `SimulatorTransport` runs its simulator.
 
     `send` waits while the system has not yet accepted `most_frames` earlier frames. The simulator rests after
-    `rest_cycles` without a beat. At rest, the simulator still runs briefly every `idle_seconds`, for accelerators that
-    send spontaneously (None: never). Like hardware whose output is not read, the simulator stops while unreceived
-    bursts contain `most_bytes`. If the simulator ends unexpectedly, another one is started, up to `restarts` times.
+    `rest_cycles` without a beat, or after four of the system's own longest pauses if they are longer. At rest, the
+    simulator still runs briefly every `idle_seconds`, for accelerators that send spontaneously (None: never). Like
+    hardware whose output is not read, the simulator stops while unreceived bursts contain `most_bytes`. If the
+    simulator ends unexpectedly, another one is started, up to `restarts` times.
     """
 
     most_frames: int = 2
@@ -357,6 +360,7 @@ class SimulatorTransport(Closing):
         self._step = self._short_step = self._quiet_step = _FEWEST_CYCLES
         self._began = self._changed_at = self._wakes_at = self._counted_at = 0.0
         self._passes_frames = False  # the run
+        self._rest_cycles = self._pace.rest_cycles
         self._simulator = start()
 
     def send(self, frame: bytes) -> None:
@@ -395,10 +399,10 @@ class SimulatorTransport(Closing):
             return item
 
     def is_at_rest(self) -> bool:
-        """Return whether the system has accepted all frames, and then had no beat for `rest_cycles`."""
+        """Return whether the system has accepted all frames, and then had no beat for long enough."""
         with self._changed:
             is_busy = self._frames or self._received or self._simulator.begun
-            return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
+            return not is_busy and self._simulator.quiet >= self._rest_cycles
 
     def close(self) -> None:
         """Close the transport and kill the simulator. A second call does nothing."""
@@ -436,7 +440,7 @@ class SimulatorTransport(Closing):
 
     def _rest_seconds(self) -> float:
         """Return the seconds for which there is no work."""
-        if self._simulator.begun or self._sent or self._simulator.quiet < self._pace.rest_cycles:
+        if self._simulator.begun or self._sent or self._simulator.quiet < self._rest_cycles:
             return 0.0
         return self._wakes_at - time.monotonic()
 
@@ -482,8 +486,9 @@ class SimulatorTransport(Closing):
             self._begin()
         if not self._simulator.has_report(seconds):
             return ()
-        first = self._simulator.cycle
+        first, quiet = self._simulator.cycle, self._simulator.quiet
         events = self._simulator.finish()
+        self._note_pause(quiet, self._simulator.cycle - first)
         now = time.monotonic()
         self._adapt(self._simulator.cycle - first, now)
         if any(not isinstance(event, Waits) for event in events):
@@ -498,6 +503,12 @@ class SimulatorTransport(Closing):
             for event in events:
                 self._observe(event)
         return events
+
+    def _note_pause(self, quiet: int, cycles: int) -> None:
+        """Note a pause of the system itself, which a beat has ended in a run of `cycles` without new frames."""
+        if not self._passes_frames and self._simulator.quiet < cycles:
+            pause = quiet + cycles - self._simulator.quiet
+            self._rest_cycles = max(self._rest_cycles, min(_PAUSES_TO_REST * pause, _MOST_REST_CYCLES))
 
     def _adapt(self, cycles: int, now: float) -> None:
         """Adapt the number of cycles in a step to the simulator's speed, after a run of `cycles`."""

@@ -27,8 +27,13 @@ struct PipeOptions {
   std::size_t bytes_waiting = 1 << 24;    // of bursts that are waiting for receive()
   // The duration of a run by the wall clock. A frame that arrives during a run waits for its end.
   std::chrono::nanoseconds run_time = std::chrono::milliseconds(1);
-  std::uint32_t cycles_to_rest = 100000;  // the system counts as at rest after these cycles without a beat
-  Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send spontaneously
+  // The system counts as at rest after these cycles without a beat, or after four of its own longest pauses, but not
+  // after more than most_cycles_to_rest. A simulation that never sleeps would use the processor time that an arriving
+  // message needs.
+  std::uint32_t cycles_to_rest = 500;
+  std::uint32_t most_cycles_to_rest = 100000;
+  // How often a system at rest runs, for accelerators that send spontaneously or compute for longer.
+  Timeout idle_run = std::chrono::milliseconds(50);
   std::chrono::nanoseconds patience = std::chrono::seconds(2);  // longest wait for the simulator to end
 };
 
@@ -98,6 +103,8 @@ class PipeTransport : public Transport {
   static constexpr unsigned kVersion = 5;  // of requests and reports
   // The interval at which a simulator at rest is checked, since it may have ended.
   static constexpr std::chrono::nanoseconds kLook = std::chrono::milliseconds(250);
+  static constexpr std::uint32_t kFewestCycles = 64, kMostCycles = 1 << 20;  // of a run
+  static constexpr std::uint64_t kPausesToRest = 4;
 
   void throw_if_over() const {
     if (is_closing_) throw TransportError("the transport is closed");
@@ -115,7 +122,9 @@ class PipeTransport : public Transport {
         const std::uint64_t before = cycle_;
         if (!request()) fail_with_child();
         if (place_ == 0) check_version();
-        while (take_report()) {
+        for (std::size_t run = 0; run < runs_; ++run) {
+          while (take_report()) {
+          }
         }
         adapt(cycle_ - before, std::chrono::steady_clock::now() - begun);
       }
@@ -161,17 +170,23 @@ class PipeTransport : public Transport {
       const auto header = with_number('F', static_cast<std::uint32_t>(frame.size()));
       if (!child_.write(header.data(), header.size()) || !child_.write(frame.data(), frame.size())) return false;
     }
-    const auto run = with_number('R', static_cast<std::uint32_t>(cycles_a_run_));
-    return child_.write(run.data(), run.size());
+    // A run ends when a frame is taken. Waiting for this process then would take longer than the simulation.
+    runs_ = frames.size() + 1;
+    const auto run = with_number('R', frames.empty() ? quiet_step_ : step_);
+    Bytes all;
+    for (std::size_t number = 0; number < runs_; ++number) all.insert(all.end(), run.begin(), run.end());
+    return child_.write(all.data(), all.size());
   }
 
-  // Choose the number of cycles so that the next run takes the set time, judging by the last run.
+  // Choose the cycles of the next runs, after one of `cycles` that took `time`: as many as take the set time, but few
+  // after a burst, whose receivers need the processor more than possibly idle hardware.
   void adapt(std::uint64_t cycles, std::chrono::nanoseconds time) {
-    constexpr double kFewest = 16, kMost = 1 << 20;
-    if (cycles == 0 || time.count() <= 0) return;
-    const double wanted = static_cast<double>(cycles) * static_cast<double>(pipe_.run_time.count()) /
-                          static_cast<double>(time.count());
-    cycles_a_run_ = std::clamp(wanted, kFewest, kMost);
+    if (runs_ == 1 && time > 2 * pipe_.run_time) {
+      step_ = std::max(step_ / 2, kFewestCycles);
+    } else if (cycles == runs_ * step_ && time < pipe_.run_time / 2) {
+      step_ = std::min(2 * step_, kMostCycles);
+    }
+    quiet_step_ = std::exchange(has_burst_, false) ? kFewestCycles : std::min(2 * quiet_step_, step_);
   }
 
   static Bytes with_number(char letter, std::uint32_t number) {
@@ -230,6 +245,7 @@ class PipeTransport : public Transport {
   }
 
   void take_burst() {
+    has_burst_ = true;
     Burst burst;
     burst.tid = static_cast<unsigned>(number(2));
     burst.is_aborted = number(1) != 0;
@@ -268,10 +284,16 @@ class PipeTransport : public Transport {
       throw TransportError("the simulator reports cycle " + std::to_string(cycle) + " after cycle " +
                            std::to_string(cycle_));
     }
+    // A beat without a new frame ends a pause of the system itself.
+    const std::uint64_t ran = cycle - cycle_;
+    if (quiet < ran && busy_ != cycle_) longest_pause_ = std::max(longest_pause_, quiet_ + ran - quiet);
+    quiet_ = quiet;
     cycle_ = cycle;
+    const auto most = std::max(pipe_.cycles_to_rest, pipe_.most_cycles_to_rest);
+    const auto to_rest = std::clamp<std::uint64_t>(kPausesToRest * longest_pause_, pipe_.cycles_to_rest, most);
     const std::lock_guard<std::mutex> lock(mutex_);
     // A frame that the system has not taken for this time does not keep the simulation running.
-    is_at_rest_ = std::min(quiet, cycle - busy_) >= pipe_.cycles_to_rest && waiting_.empty();
+    is_at_rest_ = std::min(quiet, cycle - busy_) >= to_rest && waiting_.empty();
     changed_.notify_all();
   }
 
@@ -324,7 +346,12 @@ class PipeTransport : public Transport {
   std::uint64_t place_ = 0;  // number of report bytes so far
   std::uint64_t cycle_ = 0;  // current cycle of the simulator
   std::uint64_t busy_ = 0;   // cycle at which it last got a frame
-  double cycles_a_run_ = 1000;
+  std::uint64_t quiet_ = 0;  // cycles without a beat, up to the current one
+  std::uint64_t longest_pause_ = 0;
+  std::size_t runs_ = 1;     // that were asked for together
+  bool has_burst_ = false;   // in one of them
+  std::uint32_t step_ = kFewestCycles;        // cycles of a run
+  std::uint32_t quiet_step_ = kFewestCycles;  // the same without new frames
 
   mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
