@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore, stores
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.diagnostics import fail, nearest
 from fusesoc_firm.text.files import read_file, write_whole
-from fusesoc_firm.tools.digests import default_root, digest_of
+from fusesoc_firm.tools.digests import digest_of, texts_folder
 
 # The newest distributions with long-term support that the round-trip tests use.
 _DEFAULTS = {1: "noetic", 2: "jazzy"}
@@ -76,7 +75,7 @@ def _texts(version: int, name: str) -> dict[MessageName, str]:
 
     rosbags takes some 60 ms to load its tables, so the texts are kept in the folder of cached results.
     """
-    path = texts_folder(os.environ) / f"{name}-{_tables_digest()}.json"
+    path = Path(texts_folder(os.environ), f"{name}-{_tables_digest()}.json")
     texts = _kept(path)
     if texts is None:
         texts = _generated(version, name)
@@ -85,11 +84,6 @@ def _texts(version: int, name: str) -> dict[MessageName, str]:
             write_whole(path, json.dumps(texts).encode())
     names = (MessageName(*known.split("/msg/")) for known in texts)
     return dict(zip(names, texts.values(), strict=True)) | _ADDED.get(version, {})
-
-
-def texts_folder(environment: Mapping[str, str]) -> Path:
-    """Return the folder of the texts that earlier processes kept."""
-    return Path(default_root(environment), "definitions")
 
 
 def _kept(path: Path) -> dict[str, str] | None:

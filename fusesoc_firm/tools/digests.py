@@ -35,3 +35,8 @@ def default_root(environment: Mapping[str, str] = os.environ) -> str:
         return os.path.abspath(os.path.expanduser(chosen))
     base = environment.get("XDG_CACHE_HOME") or "~/.cache"
     return os.path.join(os.path.abspath(os.path.expanduser(base)), "fusesoc_firm")
+
+
+def texts_folder(environment: Mapping[str, str]) -> str:
+    """Return the folder of texts of installed packages that earlier processes kept."""
+    return os.path.join(default_root(environment), "definitions")

@@ -1,8 +1,9 @@
 """Record the files and folders that this process reads, with their states, by Python's audit hooks (PEP 578).
 
-The key must cover everything that a generator reads; otherwise an edit would go unnoticed. Four groups are not
+The key must cover everything that a generator reads; otherwise an edit would go unnoticed. Five groups are not
 recorded: Python and its installed packages, whose versions are part of the key; this package, whose files have a
-separate digest; the machine's `/dev`, `/etc`, `/proc` and `/sys`; and files that other programs read.
+separate digest; texts that are kept of installed packages (`texts_folder`); the machine's `/dev`, `/etc`, `/proc` and
+`/sys`; and files that other programs read.
 
 If a file, such as a bag, is too large to be a whole input, its reader reads parts and declares this with `in_part`.
 Each `Part` is then an input; a repeated call is a hit while the file's size and time are unchanged.
@@ -20,6 +21,7 @@ from functools import cache
 from importlib.util import source_from_cache
 from pathlib import Path
 
+from fusesoc_firm.tools.digests import texts_folder
 from fusesoc_firm.tools.facts import Fact, state
 from fusesoc_firm.tools.own_code import PACKAGE
 
@@ -64,7 +66,7 @@ class Reads:
     files: dict[str, str | None] = field(default_factory=dict)
     parts: dict[str, str | None] = field(default_factory=dict)
     folders: dict[str, str | None] = field(default_factory=dict)
-    apart: list[str] = field(default_factory=lambda: [*_apart()])
+    apart: list[str] = field(default_factory=lambda: [*_apart(), texts_folder(os.environ)])
     kept: tuple[str, ...] = ()
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fusesoc_firm.builds.step.trace import Trace
-from fusesoc_firm.message.stores import texts_folder
+from fusesoc_firm.tools.digests import texts_folder
 from fusesoc_firm.tools.own_code import PACKAGE
 
 # The state of the machine, which is not recorded.
@@ -108,7 +108,7 @@ def places_of(folder: Path, temporary: Path, environment: Mapping[str, str], dec
             environment.get("CCACHE_DIR") or os.path.join(caches, "ccache"),
             os.path.join(home, ".ccache"),
             os.path.join(caches, "YoWASP"),
-            str(texts_folder(environment)),
+            texts_folder(environment),
         ),
         frozenset(map(os.path.realpath, declared)),
         home,
