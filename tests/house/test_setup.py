@@ -376,7 +376,7 @@ def test_why_ros2_is_missing_is_one_line(tmp_path: Path, pip: str, tried: int) -
         ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "its targets: default, sim, sim_icarus, sim_verilator,"]),
         ("sim TARGET=lint", ["target 'lint' of", "its targets with such a flow: sim, sim_icarus, sim_verilator,"]),
         ("sim SYSTEM=robot:sys:no", ["unknown core 'robot:sys:no'", "cores with sim: ", "robot:sys:quat2euler:"]),
-        ("bitstream BOARD=iceberg", ["has no target 'iceberg'", "icebreaker, kr260, quartus, tangnano9k, ulx3s"]),
+        ("bitstream BOARD=iceberg", ["has no target 'iceberg'", "icebreaker, kr260, quartus, step_mxo2, tangnano9k"]),
     ],
 )
 def test_what_is_unknown_is_refused_before_anything_is_installed(

@@ -15,7 +15,8 @@ from fusesoc_firm.text.diagnostics import InputError
 from tests.system.systems import converter, specification
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
-OPEN, VENDORS = {"icebreaker", "tangnano9k", "ulx3s"}, {"kr260", "quartus", "zcu104", "zynq7000"}
+OPEN = {"crosslink_nx_evn", "gatemate_a1_evb", "icebreaker", "step_mxo2", "tangnano9k", "ulx3s"}
+VENDORS = {"kr260", "quartus", "zcu104", "zynq7000"}
 
 
 def offered(project: str, folder: Path) -> set[str]:
