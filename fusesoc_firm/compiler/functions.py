@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 
 from fusesoc_firm.compiler.arithmetic import Arithmetic, RefusalError
@@ -121,5 +120,8 @@ def called(name: str, arithmetic: Arithmetic, values: list[Node]) -> Node:
     if not call.fewest <= len(values) <= call.most:
         wanted = str(call.fewest) if call.fewest == call.most else f"{call.fewest} or more"
         raise RefusalError(f"'{name}' takes {wanted} numbers in hardware, not {len(values)}")
-    make = partial(call.make, arithmetic)
-    return arithmetic.own(make(*values) if call.is_choice else arithmetic.each(make, *values))
+
+    def make(*numbers: Node) -> Node:
+        return arithmetic.own(call.make(arithmetic, *numbers))
+
+    return make(*values) if call.is_choice else arithmetic.each(make, *values)

@@ -207,7 +207,8 @@ import math
 
 def roots(m):
     return {
-        "a": math.sqrt(abs(m.a)), "b": m.b ** 0.5, "c": m.c ** 2.0 + m.i ** 2.0, "d": math.atan2(m.c, m.d),
+        "a": math.sqrt(abs(m.a if m.q else m.w[0])), "b": m.b ** 0.5, "c": m.c ** 2.0 + m.i ** 2.0,
+        "d": math.atan2(m.c, m.d),
         "v": [math.hypot(m.a, m.b), math.sin(m.c), 1 / m.d], "p": math.isinf(m.a), "q": math.isfinite(m.b),
     }
 """,
