@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from itertools import pairwise
 
 from fusesoc_firm.noc.network import Flow, Network
 
-# LUT4 of a buffer, and of each further source of an output: for each bit of a beat, and beside the bits.
-_BUFFER_BIT, _BUFFER, _TURN_BIT, _TURN = 0.97, 2.2, 0.74, 15.4
+# LUT4 of a buffer for each bit of a beat, and of each further source of an output for each bit and beside the bits.
+_BUFFER_BIT, _TURN_BIT, _TURN = 1.07, 0.70, 15.4
 # LUT4 of a sender beside one for each bit of its messages, and of a source of a merge beside those for its bits.
 _SENDER, _SOURCE = 15, 6
 
@@ -27,13 +28,17 @@ def sender_lut(bits: int) -> int:
     return bits + _SENDER
 
 
+def router_lut(turns: Collection[tuple[int, int]], bits: int) -> int:
+    """Return the estimated LUT4 of a router whose beats have so many bits, with the last mark and the destination."""
+    buffers = len({source for source, _ in turns})
+    further = sum(count - 1 for count in Counter(sink for _, sink in turns).values())
+    return round(buffers * _BUFFER_BIT * bits + further * (_TURN + _TURN_BIT * bits))
+
+
 def routers_lut(network: Network, width: int) -> int:
     """Return the estimated LUT4 of all routers for streams of `width` bits, of which all beats are full."""
-    # The mark of the last beat, and the destination.
     bits = width + 1 + max(1, (network.endpoints - 1).bit_length())
-    buffers = sum(len({source for source, _ in turns}) for turns in network.turns)
-    further = sum(count - 1 for turns in network.turns for count in Counter(sink for _, sink in turns).values())
-    return round(buffers * (_BUFFER + _BUFFER_BIT * bits) + further * (_TURN + _TURN_BIT * bits))
+    return sum(router_lut(turns, bits) for turns in network.turns)
 
 
 def delay(network: Network, flow: Flow, sink: int) -> int:
