@@ -47,7 +47,7 @@ def _bench(arguments: argparse.Namespace) -> None:
     loaded = load(arguments)
     found = fabrics(loaded)
     if arguments.json:
-        print_json([{"fabric": item.name, **asdict(traffic(item))} for item in found if item.network])
+        print_json([{"fabric": item.name, **asdict(traffic(item))} for item in found if not item.fault])
         return
     if len(found) == 1:
         print("no topic is within the FPGA")

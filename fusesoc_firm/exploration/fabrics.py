@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Any, NamedTuple
 
 from fusesoc_firm.noc.estimate import delay, merge_lut, routers_lut, sender_lut
-from fusesoc_firm.noc.model import Frame, arrivals
+from fusesoc_firm.noc.model import Frame, arrivals, merged
 from fusesoc_firm.noc.network import Network, topologies
 from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.exchange import field_bits
@@ -37,6 +38,8 @@ class Fabric:
     cycles: int = 0
     interval: int = 1
     fault: str = ""
+    # Of wires: the sources of each merge.
+    merges: tuple[int, ...] = ()
 
     @property
     def network(self) -> Network | None:
@@ -81,7 +84,8 @@ def _wired(name: str, system: DerivedSystem) -> Fabric:
     """Return wires, with a merge for each topic of several publishers; it may have to turn to the publisher first."""
     merges = [item for item in system.junctions if item.topic and item.sources > 1]
     lut = sum(merge_lut(item.sources, field_bits(item.frame)) for item in merges)
-    return Fabric(name, lut=lut, ff=sum(item.sources for item in merges), cycles=1 if merges else 0)
+    sources = tuple(item.sources for item in merges)
+    return Fabric(name, lut=lut, ff=sum(sources), cycles=1 if merges else 0, merges=sources)
 
 
 def _exchanged(name: str, system: DerivedSystem, exchange: Exchange) -> Fabric:
@@ -117,7 +121,7 @@ def _bits(junction: Junction) -> int:
 
 @dataclass(frozen=True)
 class Traffic:
-    """What an exchange does with much traffic, by its cycle model.
+    """What a way does with much traffic, by its cycle model.
 
     `rate` is the number of messages in 1,000 cycles from the slowest publisher to its readers, if all publishers always
     have one. `mean` and `worst` are the cycles of a message if each publisher sends half as many, at random times.
@@ -129,9 +133,10 @@ class Traffic:
 
 
 def traffic(fabric: Fabric) -> Traffic:
-    """Return the traffic of an exchange for all topics together."""
+    """Return the traffic of a way for all topics together."""
     network = fabric.network
-    assert network is not None
+    if network is None:
+        return _wired_traffic(max(fabric.merges, default=1))
     sources = sorted({flow.source for flow in network.flows})
     always = [_Sent(0, source) for source in sources for _ in range(_CYCLES // min(_beats(network)) + 1)]
     ends = _received(network, always)
@@ -145,6 +150,17 @@ def traffic(fabric: Fabric) -> Traffic:
     # The first cycle of a message is that in the register of its publisher, the last one that at its reader.
     waits = [end + 2 - some[number].cycle for number, end in ends.items()]
     return Traffic(1000 * rate, sum(waits) / len(waits) if waits else 0.0, max(waits, default=0))
+
+
+def _wired_traffic(sources: int) -> Traffic:
+    """Return the traffic of the largest merge of wires, on which a message passes in a cycle."""
+    always = [range(_CYCLES)] * sources
+    counts = Counter(source for source, _, cycle in merged(always, _CYCLES) if cycle >= _WARM)
+    rate = min(counts.values()) / (_CYCLES - _WARM)
+    random = Random(_SEED)
+    some = [[cycle for cycle in range(_CYCLES) if random.random() < rate / 2] for _ in range(sources)]
+    waits = [cycle - some[source][number] for source, number, cycle in merged(some, _CYCLES)]
+    return Traffic(1000 * rate, sum(waits) / len(waits), max(waits))
 
 
 class _Sent(NamedTuple):

@@ -38,10 +38,10 @@ def _row(fabric: Fabric) -> tuple[str, ...]:
 
 
 def traffic_text(found: Sequence[Fabric], chosen: str) -> Iterator[str]:
-    """Yield the lines of a table of the exchanges with much traffic."""
+    """Yield the lines of a table of the ways with much traffic."""
     rows = [("", "way", "rate", "mean", "worst")]
     for item in found:
-        if item.network:
+        if not item.fault:
             result = traffic(item)
             mark = "*" if item.name == chosen else ""
             rows.append((mark, item.name, f"{result.rate:.1f}", f"{result.mean:.1f}", str(result.worst)))

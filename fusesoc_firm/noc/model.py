@@ -166,7 +166,7 @@ class Model:
         grant = output.grant
         if grant not in places:
             if not output.is_busy:
-                output.grant = _next(places, grant)
+                output.grant = next_place(places, grant)
             return
         is_free = (
             len(self._inputs[output.following].beats) < self._buffers if output.sink is None else ready(output.sink)
@@ -175,7 +175,7 @@ class Model:
             source = output.inputs[grant]
             output.is_busy = not self._inputs[source].beats[0].is_last
             if not output.is_busy:
-                output.grant = _next(places, grant)
+                output.grant = next_place(places, grant)
             yield source, number
 
     def _pop(self, number: int) -> None:
@@ -190,7 +190,7 @@ class Model:
                 self._active.discard(number)
 
 
-def _next(places: Sequence[int], grant: int) -> int:
+def next_place(places: Sequence[int], grant: int) -> int:
     """Return the place after the present one that requests, in a circle, or the present one."""
     higher = [place for place in places if place > grant]
     lower = [place for place in places if place < grant]
@@ -226,6 +226,21 @@ def arrivals(
             waiting[source].popleft()
         found += [Arrival(cycle, sink, beat.tag) for sink, beat in arrived.items() if beat.is_last]
     return found
+
+
+def merged(dues: Sequence[Sequence[int]], cycles: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the source, number and cycle of each message that leaves a merge of wires, whose sink takes it at once.
+
+    `dues` are the cycles in which the messages of each source are due. As in `firm_message_merge`, the turn goes to the
+    next source that waits when a message has left, or after a cycle without one.
+    """
+    turn, left = 0, [deque(enumerate(due)) for due in dues]
+    for cycle in range(cycles):
+        waiting = [source for source, messages in enumerate(left) if messages and messages[0][1] <= cycle]
+        if turn in waiting:
+            number, _ = left[turn].popleft()
+            yield turn, number, cycle
+        turn = next_place(waiting, turn)
 
 
 def throughput(network: Network, *, buffers: int = 2, beats: int = 8, cycles: int = 4000, seed: int = 1) -> float:

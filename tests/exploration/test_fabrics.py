@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.exploration.fabrics import Fabric, fabrics, traffic
+from fusesoc_firm.exploration.fabrics import Fabric, Traffic, fabrics, traffic
 from fusesoc_firm.exploration.fabrics_text import map_text
 from fusesoc_firm.noc.estimate import delay
 from fusesoc_firm.noc.model import Frame, arrivals
@@ -110,6 +110,14 @@ def test_traffic_is_limited_by_the_busiest_link(tmp_path: Path) -> None:
         assert beats < result.mean < result.worst < 20 * beats
 
 
+def test_traffic_of_wires_is_that_of_the_largest_merge(tmp_path: Path) -> None:
+    """Two publishers take turns; without a merge, a message passes in the cycle in which it is due."""
+    wires = traffic(found(spec(tmp_path, "auto"))["wires"])
+    assert wires.rate == pytest.approx(500)
+    assert 0 < wires.mean < wires.worst < 10
+    assert traffic(Fabric("wires")) == Traffic(1000, 0, 0)
+
+
 def test_the_map_of_a_grid_and_of_others(tmp_path: Path) -> None:
     mesh = found(spec(tmp_path, "mesh"))["mesh"].exchange
     crossbar = found(spec(tmp_path, "mesh"))["crossbar"].exchange
@@ -163,10 +171,10 @@ def test_the_map_is_a_picture(tmp_path: Path, capsys: Captured) -> None:
 def test_bench(tmp_path: Path, capsys: Captured) -> None:
     path = spec(tmp_path, "mesh")
     lines = out(capsys, "fabric", "bench", path).splitlines()
-    assert [line.lstrip("* ").split()[0] for line in lines[2:]] == ["way", "crossbar", "mesh", "chain", "ring"]
-    assert lines[4].startswith("*  mesh")
+    assert [line.lstrip("* ").split()[0] for line in lines[2:]] == ["way", "wires", "crossbar", "mesh", "chain", "ring"]
+    assert lines[5].startswith("*  mesh")
     data = json.loads(out(capsys, "fabric", "bench", path, "--json"))
-    assert [item["fabric"] for item in data] == ["crossbar", "mesh", "chain", "ring"]
+    assert [item["fabric"] for item in data] == ["wires", "crossbar", "mesh", "chain", "ring"]
     assert out(capsys, "fabric", "bench", spec(tmp_path, "auto", has_topics=False)) == "no topic is within the FPGA\n"
 
 

@@ -15,24 +15,16 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.exploration.worst_case import WorstTimes, worst_times
+from fusesoc_firm.exploration.worst_case import worst_times
 from fusesoc_firm.system.derived.timing import responses_of
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import LoadedSystem
 from tests.applications.applications import SPECS
-from tests.noc.adversary import worst_found
+from tests.exploration.topic_systems import accelerator, converter, loaded, random_system, ratios
 from tests.seeds import seeded
 
 Captured = pytest.CaptureFixture[str]
 SEED = seeded(71)
-MESSAGES = (
-    "std_msgs/Bool",
-    "std_msgs/Float32",
-    "geometry_msgs/Point",
-    "geometry_msgs/Quaternion",
-    "geometry_msgs/Twist",
-)
-FABRICS = ("crossbar", "mesh", "concentrated_mesh", "chain", "tree", "ring", "torus")
 # The bound for the frame of a point, of 8 beats of 32 bits, under round robin.
 RESPONSE = 2 + 8
 # Of the accelerators of demo systems in VHDL: the most cycles to an answer, and those between messages for one that
@@ -48,29 +40,6 @@ PACES = {
 SMALL = ("5.0e-324", "1.0e-310", "2.2e-308", "1.0e-300", "3.0e-162", "1.0e-160", "0.0", "1.0", "1.0e-155")
 
 
-def side(message: str) -> list[dict[str, str]]:
-    return [{"middleware": "ROS2", "message": message}]
-
-
-def converter(name: str, mode: str, message: str, **keys: Any) -> dict[str, Any]:
-    return {"name": name, "mode": mode, **side(message)[0], **keys}
-
-
-def accelerator(name: str, message: str, answer: str, latency: int) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A type and its instance."""
-    interface = {"input": side(message), "output": side(answer)}
-    type_ = {"name": f"{name}_type", "type": "VHDL", "sources": "acc.vhd", "latency": latency, "interface": interface}
-    return type_, {"name": name, "type": f"{name}_type", "outgoing": [{"name": f"{name}_out"}]}
-
-
-def loaded(project: dict[str, Any], types: list[Any], blocks: list[Any], folder: Path) -> LoadedSystem:
-    (folder / "acc.vhd").touch()
-    path = folder / "robot.yaml"
-    content = {"project": {"name": "robot", "scheduler": "round_robin", **project}, "accelerators": types}
-    path.write_text(yaml.safe_dump({**content, "blocks": blocks}, sort_keys=False), encoding="utf-8")
-    return load_beside(path)
-
-
 def pipeline(folder: Path, fabric: str, **reader: Any) -> LoadedSystem:
     """Two accelerators, with a topic between."""
     point = "geometry_msgs/Point"
@@ -84,24 +53,6 @@ def pipeline(folder: Path, fabric: str, **reader: Any) -> LoadedSystem:
         converter("second_out", "publisher", point),
     ]
     return loaded({"fabric": fabric, "width": 32}, list(types), blocks, folder)
-
-
-def random_system(chance: Random, folder: Path) -> LoadedSystem:
-    """Up to eight accelerators that publish topics, and subscribe to those of accelerators before them."""
-    count = chance.randint(3, 8)
-    topics = [(f"topic{number}", chance.choice(MESSAGES)) for number in range(max(2, count - 2))]
-    types, blocks = [], [converter("host", "subscriber", topics[0][1], outgoing=[{"name": "acc0"}])]
-    for number in range(count):
-        name, message = f"acc{number}", topics[0][1]
-        if number:
-            topic, message = topics[chance.randrange(min(number, len(topics) - 1))]
-            blocks.append(converter(f"{name}_in", "subscriber", message, topic=topic, outgoing=[{"name": name}]))
-        topic, answer = topics[min(number, len(topics) - 1)]
-        type_, block = accelerator(name, message, answer, chance.randint(1, 40))
-        types.append(type_)
-        blocks += [block, converter(f"{name}_out", "publisher", answer, topic=topic)]
-    project = {"fabric": chance.choice(FABRICS), "width": chance.choice((8, 16, 32, 64))}
-    return loaded(project, types, blocks, folder)
 
 
 def cycles(system: LoadedSystem) -> dict[tuple[str, str], int | None]:
@@ -168,17 +119,6 @@ def test_it_is_shown(tmp_path: Path, capsys: Captured) -> None:
         assert main(["fabric", "show", "robot.yaml", "--json"]) == 0
         times = json.loads(capsys.readouterr().out)["worstCase"]
     assert [(item["from"], item["to"]) for item in times] == [("first_out", "second_in"), ("start", "second_out")]
-
-
-def ratios(system: LoadedSystem, seed: int, runs: int, cycles: int) -> list[float]:
-    """The bound of each message in the exchange over the slowest found one."""
-    bounds = WorstTimes(system, responses_of(system.system)).exchange
-    found = []
-    for (source, sink), time in worst_found(bounds, seed, runs, cycles).items():
-        bound = bounds.acceptance(source) - 1 + bounds.delivery(source, sink)
-        assert time <= bound, f"seed {seed}: from {source} to {sink}, {time} > {bound}"
-        found.append(bound / time)
-    return found
 
 
 @pytest.mark.parametrize("number", range(4))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.noc.model import Arrival, Beat, Frame, Model, arrivals, latency, random_frames, throughput
+from fusesoc_firm.noc.model import Arrival, Beat, Frame, Model, arrivals, latency, merged, random_frames, throughput
 from fusesoc_firm.noc.network import Flow, Network, chain, crossbar, mesh
 from tests.noc.exchanges import all_to_all, analysed, network
 from tests.noc.test_exchange import NETWORKS, simulated
@@ -57,6 +57,18 @@ def test_arrivals() -> None:
     frames = [Frame(0, 0, 4), Frame(10, 0, 2), Frame(10, 1, 3)]
     # The second router changes to the first frame, then to the third one, which is there a cycle before the second one.
     assert arrivals(made, frames, 40) == [Arrival(3 + 1 + 3, 2, 0), Arrival(12 + 1 + 2, 2, 2), Arrival(15 + 2, 2, 1)]
+
+
+def test_a_merge_turns_as_in_hardware() -> None:
+    """Its turn stays with the last source, goes on at the end of a message, or after a cycle without one."""
+    assert [*merged([[0, 1, 5], [1, 1, 9], []], 12)] == [
+        (0, 0, 0),
+        (0, 1, 1),
+        (1, 0, 2),
+        (1, 1, 3),
+        (0, 2, 6),
+        (1, 2, 10),
+    ]
 
 
 def test_a_deaf_sink_stops_only_frames_that_need_it() -> None:
