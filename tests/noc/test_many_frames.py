@@ -48,6 +48,7 @@ def _run(program: Path, frames: int, seed: int, source_stall: int, sink_stall: i
     found = re.search(r"PASS (\d+) frames", result.output)
     assert result.exit_code == 0, result.output
     assert found, result.output
+    print(found[0])
     return int(found[1])
 
 
