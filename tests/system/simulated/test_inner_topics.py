@@ -396,6 +396,7 @@ def test_a_status_counts_at_each_endpoint(tmp_path: Path, fabric: str, frames: i
     lines = [f"< @{number} frame\n  {answer.hex()}\n" for number, (_, answers) in enumerate(sent) for answer in answers]
     (system.folder / "expected.txt").write_text("".join(lines))
     assert system.passes(SEED=1)
+    assert system.work.latches(system.entity) == []
 
 
 def value(number: int) -> bytes:
