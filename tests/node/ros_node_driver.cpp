@@ -58,6 +58,7 @@ class Middleware {
     };
   }
 
+  void offer(firm::HardwareParameters&, firm::SetParameters) {}
   void serve(const firm::Service&, firm::CallHandler handler) {
     give_ = [handler = std::move(handler)] {
       handler(firm::Bytes(8, 7), [](const firm::Answer&) { fail(); });

@@ -1,7 +1,8 @@
 """Sets parameters of a node, and sends numbers to it, as other nodes of ROS do. The Python of ROS runs it.
 
-The arguments are the version of ROS, the node's name and steps in JSON: ["set", NAME, VALUE], ["get", NAME] or ["ask",
-NUMBER]. It prints the list of results in JSON: of `set`, the reason of a refusal.
+The arguments are the version of ROS, the node's name and steps in JSON, the methods of the peers with their arguments:
+["set", NAME, VALUE], ["get", NAME], ["ask", NUMBER] and others. It prints the list of results in JSON: of `set`, the
+reason of a refusal.
 """
 
 from __future__ import annotations
@@ -96,6 +97,23 @@ class Peer2:
         from rclpy.parameter import parameter_value_to_python
 
         return parameter_value_to_python(self._done(self._client.get_parameters([name])).values[0])
+
+    def list(self, prefix: str) -> Any:
+        """Return the names of the parameters with a prefix."""
+        return [*self._done(self._client.list_parameters([prefix], 10)).result.names]
+
+    def describe(self, name: str) -> Any:
+        """Return type and range of a parameter."""
+        (found,) = self._done(self._client.describe_parameters([name])).descriptors
+        (type_,) = self._done(self._client.get_parameter_types([name])).types
+        ranges = [*found.integer_range, *found.floating_point_range]
+        return [found.name, found.type, type_, [[each.from_value, each.to_value] for each in ranges]]
+
+    def set_all(self, values: dict[str, Any]) -> str:
+        """Set several parameters, all or none; return the reason of a refusal."""
+        wanted = [self._parameter(name, value=value) for name, value in values.items()]
+        result = self._done(self._client.set_parameters_atomically(wanted)).result
+        return "" if result.successful else result.reason
 
     def ask(self, number: int) -> Any:
         """Send a number; return the answer."""

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.cli import main
+from tests.ros.cpp_nodes import Node, NodeProcess
 from tests.ros.live_nodes import LiveNode
 from tests.ros.places import Place, running, versions
 from tests.system.simulated.test_parameters import specification
@@ -43,28 +44,39 @@ def first_values(place: Place, **values: object) -> list[str]:
     ]
 
 
-def steps(place: Place, *wanted: tuple[Any, ...]) -> list[Any]:
-    command = [place.ros.python, str(PEER), str(place.version), "/tuning", json.dumps(wanted)]
+def steps(place: Place, node: str, *wanted: tuple[Any, ...]) -> list[Any]:
+    command = [place.ros.python, str(PEER), str(place.version), node, json.dumps(wanted)]
     done = subprocess.run(command, env=dict(place.ros.environment), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     found: list[Any] = json.loads(done.stdout)
     return found
 
 
-@pytest.mark.parametrize("is_generated", [False, True], ids=["live", "generated"])
-def test_a_parameter_changes_the_answers(place: Place, spec: Path, is_generated: bool) -> None:
+def started(place: Place, spec: Path, language: str, values: list[str]) -> NodeProcess:
+    """A node of the system: that of `firm live`, or a generated one."""
+    transport = place.simulator(spec)
+    if language == "cpp":
+        return Node(place.ros, place.program(spec), transport, *values)
     command = ["live", str(spec)]
-    if is_generated:
-        assert main(["system", "node", str(spec), "--language", "python", "-o", str(place.folder / "package")]) == 0
-        (script,) = (place.folder / "package").rglob("*_node.py")
-        command = [str(script)]
-    command += ["--transport", place.simulator(spec)]
+    if language == "python":
+        package = place.folder / "python_package"
+        assert main(["system", "node", str(spec), "--language", "python", "-o", str(package)]) == 0
+        command = [str(next(package.rglob("*_node.py")))]
+    return LiveNode(place.ros, place.folder / "node.log", [*command, "--transport", transport], *values)
+
+
+LANGUAGES = pytest.mark.parametrize("language", ["live", "python", "cpp"])
+
+
+@LANGUAGES
+def test_a_parameter_changes_the_answers(place: Place, spec: Path, language: str) -> None:
     # The master of ROS 1 keeps the values of a node that has ended.
     values = first_values(place, gain=3, offset=0.0, invert=False)
-    with LiveNode(place.ros, place.folder / "node.log", command, *values) as node:
-        node.wait_until_ready()
+    with started(place, spec, language, values):
+        name = "/tuning_node" if language == "cpp" else "/tuning"
         found = steps(
             place,
+            name,
             ("get", "block.gain"),
             ("ask", 5),
             ("set", "block.gain", -4),
@@ -84,8 +96,38 @@ def test_a_parameter_changes_the_answers(place: Place, spec: Path, is_generated:
         assert found[5:] == [-4, -24, "", 23, "", 1.0, "", 0x3F800000 - 4]
 
 
-def test_a_first_value_outside_of_the_range_ends_the_node(place: Place, spec: Path) -> None:
-    command = ["live", str(spec), "--transport", place.simulator(spec)]
-    with LiveNode(place.ros, place.folder / "node.log", command, *first_values(place, gain=101)) as node:
+@pytest.mark.parametrize("language", ["live", "cpp"])
+def test_clients_of_ros_2_find_the_parameters(place: Place, spec: Path, language: str) -> None:
+    if place.version == 1:
+        pytest.skip("the master of ROS 1 knows only values")
+    boolean, integer, real = 1, 2, 3
+    with started(place, spec, language, first_values(place, gain=2)):
+        found = steps(
+            place,
+            "/tuning_node" if language == "cpp" else "/tuning",
+            ("list", "block"),
+            ("describe", "block.gain"),
+            ("describe", "block.offset"),
+            ("describe", "block.invert"),
+            ("set_all", {"block.gain": 5, "block.invert": True}),
+            ("ask", 1),
+            ("set_all", {"block.gain": 6, "block.offset": -2.0}),
+            ("get", "block.gain"),
+            ("set", "block.gain", 1.0),
+            ("set", "block.offset", 0.25),
+            ("get", "block.offset"),
+        )
+    assert sorted(found[0]) == ["block.gain", "block.invert", "block.offset"]
+    assert found[1] == ["block.gain", integer, integer, [[-4, 100]]]
+    assert found[2] == ["block.offset", real, real, [[-1.5, 1e10]]]
+    assert found[3] == ["block.invert", boolean, boolean, []]
+    assert found[4:6] == ["", -6]
+    assert found[6] and found[8], "a value outside of the range, and one of another type, are refused"
+    assert (found[7], found[9], found[10]) == (5, "", 0.25)
+
+
+@LANGUAGES
+def test_a_first_value_outside_of_the_range_ends_the_node(place: Place, spec: Path, language: str) -> None:
+    with started(place, spec, language, first_values(place, gain=101)) as node:
         assert node.process.wait(60) == 1
         assert "the parameter 'block.gain' cannot be set: 101 is outside of the range; legal: -4 to 100" in node.said()

@@ -24,6 +24,7 @@ from fusesoc_firm.node.interface.services import NodeService
 from fusesoc_firm.node.interface.topics import DEFAULT_DEPTH, NodeTopic
 from fusesoc_firm.node.package.launch import LAUNCHERS, launch_file, package_name
 from fusesoc_firm.node.software_process import software_ports
+from fusesoc_firm.system.derived.model import BlockParameter
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import identifier
@@ -63,7 +64,7 @@ _DIALECTS = {
         needs_messages=False,
     ),
     2: _Dialect(
-        ("ros2.hpp", "rcl.hpp", "ros2_lifecycle.hpp", "ros2_services.hpp"),
+        ("ros2.hpp", "rcl.hpp", "ros2_lifecycle.hpp", "ros2_parameters.hpp", "ros2_services.hpp"),
         "Ros2",
         "hash",
         "ament_cmake",
@@ -167,7 +168,9 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
         "channels": channel_names(description) if description.digest else [],
         "contents": [", ".join(map(str, description.contents[item.block])) for item in loaded.system.subscribers],
         "software": _software(loaded, description),
-        "has_services": bool(description.services or description.actions),
+        "has_services": bool(description.services or description.actions or description.parameters),
+        "has_actions": bool(description.actions or description.parameters),
+        "parameters": [*map(_parameter, description.parameters)],
         "services": [*map(partial(_service, description), description.services)],
         "actions": [*map(partial(_action, description), description.actions)],
     }
@@ -177,8 +180,9 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
     """Return the ends of messages to and from blocks in software, or None if no such block runs on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
-        # The services and actions of the table are after the software.
-        return {"inputs": [], "outputs": []} if description.services or description.actions else None
+        # The services, actions and parameters of the table are after the software.
+        has_more = description.services or description.actions or description.parameters
+        return {"inputs": [], "outputs": []} if has_more else None
     topics = {topic.block: topic.name for topic in (*description.subscribers, *description.publishers)}
     leaving = {crossing.block: crossing.id for crossing in description.leaving}
     entering = {crossing.block: crossing.id for crossing in description.entering}
@@ -186,6 +190,13 @@ def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, A
         "inputs": [_port(topic.block, leaving, topics) for topic in ports.inputs],
         "outputs": [_port(topic.block, entering, topics) for topic in ports.outputs],
     }
+
+
+def _parameter(item: BlockParameter) -> dict[str, str]:
+    """Return the row of a parameter, whose numbers are literals."""
+    found = item.parameter
+    numbers = (float(value) for value in (found.default, found.least, found.most))
+    return {"name": item.name, "type": found.type.name, "numbers": ", ".join(map(repr, numbers))}
 
 
 def _service(description: NodeDescription, item: NodeService) -> dict[str, Any]:

@@ -31,6 +31,11 @@
 #define FIRM_STATUS_DIGEST(word) (0x30u + 4u * (word)) /* words 0 to 3, the lowest one first */
 #define FIRM_STATUS_MARK 0x4D524946u
 
+/* The parameters of accelerators (docs/reference/parameters.md): the word that software wants, and the one in effect.
+ * `firm registers` writes their numbers, and those of all registers, into a header. */
+#define FIRM_STATUS_PARAMETER_WANTED(number) (0x100u + 8u * (number))
+#define FIRM_STATUS_PARAMETER(number) (0x104u + 8u * (number))
+
 /* The first address of a channel: subscribers by id, then publishers by id. Its registers follow. */
 #define FIRM_STATUS_CHANNEL(channel) (0x8000u + 0x40u * (channel))
 #define FIRM_STATUS_SIGNATURE 0x00u

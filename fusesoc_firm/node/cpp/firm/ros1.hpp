@@ -25,12 +25,15 @@
 #include <memory>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <typeinfo>
 #include <utility>
+#include <variant>
 #include <vector>
 
+#include <firm/parameters.hpp>
 #include <firm/ros1_services.hpp>
 #include <firm/topic.hpp>
 
@@ -115,20 +118,16 @@ class Ros1 {
     std::map<std::string, std::string> found;
     for (const auto& name : names) {
       XmlRpc::XmlRpcValue value;
-      if (!ros::param::get("~" + name, value)) continue;
-      std::ostringstream text;
-      if (value.getType() == XmlRpc::XmlRpcValue::TypeBoolean) {
-        text << (static_cast<bool>(value) ? "true" : "false");
-      } else if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) {
-        text << static_cast<double>(value);
-      } else if (value.getType() == XmlRpc::XmlRpcValue::TypeString) {
-        text << static_cast<std::string>(value);
-      } else {
-        text << value;
-      }
-      found[name] = text.str();
+      if (ros::param::get(private_name(name), value)) found[name] = text_of(value);
     }
     return found;
+  }
+
+  // Let the private parameters in the master set those of the hardware; both outlive the node.
+  void offer(HardwareParameters& parameters, SetParameters set) {
+    parameters_ = &parameters;
+    set_ = std::move(set);
+    for (const auto& [name, value] : parameters.values()) put_back(name, value);
   }
 
   // Pass every message of a topic to `handler`, in the thread that calls spin().
@@ -198,6 +197,7 @@ class Ros1 {
   // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end.
   bool spin(std::chrono::milliseconds duration) {
     look_at_types();
+    look_at_parameters();
     callbacks_.callAvailable(ros::WallDuration(std::chrono::duration<double>(duration).count()));
     return ros::ok();
   }
@@ -212,6 +212,58 @@ class Ros1 {
   void flush() { std::this_thread::sleep_for(std::chrono::milliseconds(300)); }
 
  private:
+  // Return the name in the master, whose parts are separated by slashes.
+  static std::string private_name(std::string name) {
+    std::replace(name.begin(), name.end(), '.', '/');
+    return "~" + name;
+  }
+
+  static std::string text_of(XmlRpc::XmlRpcValue& value) {
+    std::ostringstream text;
+    if (value.getType() == XmlRpc::XmlRpcValue::TypeBoolean) {
+      text << (static_cast<bool>(value) ? "true" : "false");
+    } else if (value.getType() == XmlRpc::XmlRpcValue::TypeDouble) {
+      text.precision(17);
+      text << static_cast<double>(value);
+    } else if (value.getType() == XmlRpc::XmlRpcValue::TypeString) {
+      text << static_cast<std::string>(value);
+    } else {
+      text << value;
+    }
+    return text.str();
+  }
+
+  // Store the value in effect in the master.
+  static void put_back(const std::string& name, const ParameterValue& value) {
+    const std::string key = private_name(name);
+    if (const auto* truth = std::get_if<bool>(&value)) return ros::param::set(key, *truth);
+    if (const auto* real = std::get_if<double>(&value)) return ros::param::set(key, *real);
+    ros::param::set(key, static_cast<int>(std::get<std::int64_t>(value)));
+  }
+
+  // Set the parameters that have changed in the master, at intervals; the master gets back a value that is refused.
+  void look_at_parameters() {
+    const auto now = std::chrono::steady_clock::now();
+    if (!parameters_ || now < looks_at_parameters_) return;
+    looks_at_parameters_ = now + std::chrono::milliseconds(100);
+    for (const auto& parameter : parameters_->parameters()) {
+      XmlRpc::XmlRpcValue found;
+      if (!ros::param::getCached(private_name(parameter.name), found)) continue;
+      const ParameterValue before = parameters_->values().at(parameter.name);
+      std::string reason;
+      try {
+        const ParameterValue wanted = parameter.value(text_of(found));
+        if (parameter.own(wanted) == before) continue;
+        reason = set_({{parameter.name, wanted}});
+      } catch (const std::invalid_argument& fault) {
+        reason = fault.what();
+      }
+      if (reason.empty()) continue;
+      ROS_WARN("the parameter %s is not set: %s", private_name(parameter.name).c_str(), reason.c_str());
+      put_back(parameter.name, before);
+    }
+  }
+
   // The `seq` of a Header, which is little-endian on the wire.
   static std::uint64_t number_at(const std::uint8_t* data) {
     return data[0] | data[1] << 8 | data[2] << 16 | static_cast<std::uint64_t>(data[3]) << 24;
@@ -241,6 +293,9 @@ class Ros1 {
   std::map<std::string, std::string> types_;
   std::set<std::string> reported_;
   std::chrono::steady_clock::time_point looks_at_{};
+  HardwareParameters* parameters_ = nullptr;
+  SetParameters set_;
+  std::chrono::steady_clock::time_point looks_at_parameters_{};
   ros::CallbackQueue callbacks_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;

@@ -42,6 +42,7 @@
 
 #include <firm/rcl.hpp>
 #include <firm/ros2_lifecycle.hpp>
+#include <firm/ros2_parameters.hpp>
 #include <firm/ros2_services.hpp>
 #include <firm/topic.hpp>
 
@@ -72,6 +73,7 @@ class Ros2 {
     unsubscribe();
     lifecycle_.reset();
     servers_.clear();
+    parameter_servers_.clear();
     clients_.clear();
     for (auto& publisher : publishers_) ignore(rcl_publisher_fini(&publisher->rcl, &node_));
     if (is_started_) {
@@ -137,6 +139,17 @@ class Ros2 {
   void serve(const Service& service, CallHandler handler) {
     servers_.push_back(std::make_unique<RawServer>(node_, service, std::move(handler)));
     if (is_active_) servers_.back()->open();
+  }
+
+  // Let clients read and set the parameters of the hardware in every state of the node; both outlive the services.
+  // Throws MiddlewareError.
+  void offer(HardwareParameters& parameters, SetParameters set) {
+    parameters_ = std::make_unique<ParameterServices>(parameters, std::move(set));
+    const auto serve_always = [this](const Service& service, CallHandler handler) {
+      parameter_servers_.push_back(std::make_unique<RawServer>(node_, service, std::move(handler)));
+      parameter_servers_.back()->open();
+    };
+    parameters_->open(rcl_node_get_fully_qualified_name(&node_), serve_always);
   }
 
   // Return a function that calls a service. Throws MiddlewareError.
@@ -270,6 +283,9 @@ class Ros2 {
   std::vector<Lifecycle::Server> waiting_servers() const {
     std::vector<Lifecycle::Server> found;
     if (!is_serving_) return found;
+    for (const auto& server : parameter_servers_) {
+      found.push_back({server->rcl(), [taken = server.get()] { taken->take(); }});
+    }
     for (const auto& server : servers_) {
       if (server->is_open()) found.push_back({server->rcl(), [taken = server.get()] { taken->take(); }});
     }
@@ -300,6 +316,7 @@ class Ros2 {
     } else if (value.integer_value != nullptr) {
       text << *value.integer_value;
     } else if (value.double_value != nullptr) {
+      text.precision(17);
       text << *value.double_value;
     } else if (value.string_value != nullptr) {
       text << value.string_value;
@@ -449,6 +466,8 @@ class Ros2 {
   std::atomic<bool> is_active_{true};
   std::unique_ptr<Lifecycle> lifecycle_;
   std::vector<std::unique_ptr<RawServer>> servers_;
+  std::unique_ptr<ParameterServices> parameters_;
+  std::vector<std::unique_ptr<RawServer>> parameter_servers_;
   std::vector<std::unique_ptr<RawClient>> clients_;
 };
 

@@ -29,6 +29,7 @@
 #include <firm/diagnostics.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
+#include <firm/parameters.hpp>
 #include <firm/services.hpp>
 #include <firm/status.hpp>
 #include <firm/status_registers.hpp>
@@ -68,6 +69,7 @@ struct System {
   Software software{};
   std::vector<Service> services{};
   std::vector<Action> actions{};
+  std::vector<Parameter> parameters{};
 
   bool has_status_frames() const { return !digest.empty() && !has_status_registers; }
   bool has_software() const { return !software.inputs.empty(); }
@@ -90,6 +92,7 @@ struct NodeArguments {
   bool restarts = false;
   bool is_managed = false;  // the node has lifecycle states
   std::string trace;
+  std::map<std::string, std::string> parameters{};  // first values of those of the hardware, as texts
   bool wants_help = false;
 
   // Return the quality of service of a topic.
@@ -280,6 +283,7 @@ class Engines {
   Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
           std::ostream* trace, bool is_first)
       : system_(system),
+        parameters_(system.parameters, arguments.parameters),
         publish_(std::move(publish)),
         from_hardware_(system.publisher_count),
         calls_(system.services, is_first, putter(), fault_taker()),
@@ -396,6 +400,15 @@ class Engines {
     for (std::size_t index = 0; index < goals.size(); ++index) take_goals(system_.actions[index].block, goals[index]);
   }
 
+  HardwareParameters& parameters() { return parameters_; }
+
+  // Set parameters of the hardware; return the reason why they are refused, or an empty text.
+  std::string set(const HardwareParameters::Values& values) {
+    return parameters_.set(values, [this](const Bytes& request) {
+      return status_word(access_status(request, std::chrono::seconds(5)));
+    });
+  }
+
   bool has_status() const { return system_.has_status_frames() || registers_.has_value(); }
 
   // Return the answer of the status to a request. Throws TransportError.
@@ -456,9 +469,13 @@ class Engines {
       // Opening the transport would reset the hardware of another system.
       if (registers_) check_digest(*registers_, system_.digest, system_.name);
       auto transport = open_transport(address, options);
+      if (registers_) {
+        parameters_.restore([this](const Bytes& request) { return status_word(registers_->access(request)); });
+      }
       if (system_.has_status_frames()) {
         StatusAccess access(*transport);
         check_digest(access, system_.digest, system_.name);
+        parameters_.restore([&](const Bytes& request) { return access.pass(request); });
       }
       return transport;
     };
@@ -478,6 +495,7 @@ class Engines {
   }
 
   const System& system_;
+  HardwareParameters parameters_;
   std::optional<StatusRegisters> registers_;  // if frames do not read the status
   const std::map<std::string, MessageHandler> publish_;
   std::vector<MessageHandler> from_hardware_;
@@ -561,6 +579,9 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   }
 
   RunningNode hardware(engines.hardware(), arguments.drain);
+  if (!system.parameters.empty()) {
+    ros.offer(engines.parameters(), [&](const HardwareParameters::Values& values) { return engines.set(values); });
+  }
   const ConnectedCalls<Ros> calls(ros, engines);
   std::optional<RunningNode> software;
   if (engines.software()) software.emplace(*engines.software(), arguments.drain);
@@ -611,8 +632,11 @@ int run(const System& system, int argc, char** argv) {
     if (!ros.start([] { return is_interrupted != 0; })) return 0;
     std::vector<std::string> words = options_of(ros.parameters(parameter_names()));
     words.insert(words.end(), given.begin(), given.end());
-    const NodeArguments arguments = parse_arguments(system, is_ros2, words);
+    NodeArguments arguments = parse_arguments(system, is_ros2, words);
     check_complete(system, arguments);
+    std::vector<std::string> names;
+    for (const auto& parameter : system.parameters) names.push_back(parameter.name);
+    arguments.parameters = ros.parameters(names);
     return serve(ros, system, arguments);
   } catch (const UsageError& fault) {
     std::cerr << system.name << "_node: " << fault.what() << "; see --help" << std::endl;

@@ -81,10 +81,9 @@ class StatusAccess {
   // Write a word; return the word before. Throws TransportError if there is no answer.
   std::uint32_t write(std::uint32_t address, std::uint32_t word) { return access(address | kStatusWrite, word); }
 
- private:
-  // Frames other than the answer are dropped.
-  std::uint32_t access(std::uint32_t address, std::uint32_t word) {
-    const Bytes request = status_request(address, word, id_bytes_);
+  // Pass on a request with ids of this size; return the word of its answer. Throws TransportError if there is none.
+  std::uint32_t pass(const Bytes& request) {
+    const auto address = status_address(request);
     transport_.send(request.data(), request.size());
     const auto end = std::chrono::steady_clock::now() + patience_;
     for (auto left = patience_; left.count() > 0; left = end - std::chrono::steady_clock::now()) {
@@ -93,6 +92,12 @@ class StatusAccess {
       if (status_address(burst->data) == address) return status_word(burst->data);
     }
     throw TransportError(kNoStatusAnswer);
+  }
+
+ private:
+  // Frames other than the answer are dropped.
+  std::uint32_t access(std::uint32_t address, std::uint32_t word) {
+    return pass(status_request(address, word, id_bytes_));
   }
 
   Transport& transport_;
