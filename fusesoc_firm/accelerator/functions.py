@@ -19,12 +19,19 @@ from typing import Any
 
 from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed
 from fusesoc_firm.accelerator.message import with_attributes
-from fusesoc_firm.accelerator.user_code import UserFunction, load_compiled, load_function
+from fusesoc_firm.accelerator.user_code import Numbers, UserFunction, load_compiled, load_function
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_answer
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import used_part
-from fusesoc_firm.system.derived.model import AcceleratorBlock, DerivedSystem, End, MessageSide, Software
+from fusesoc_firm.system.derived.model import (
+    AcceleratorBlock,
+    AcceleratorType,
+    DerivedSystem,
+    End,
+    MessageSide,
+    Software,
+)
 from fusesoc_firm.system.derived.python_function import function_name, parameter_names, prototype
 from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.diagnostics import fail
@@ -207,13 +214,19 @@ def compiled_model(system: DerivedSystem, folder: Path) -> UserFunction | None:
     return UserFunction(folder / first, "the accelerator", respond)
 
 
+def numbers_of(type_: AcceleratorType, numbers: str = "") -> Numbers:
+    """Return the numbers of a compiled function, with the parameters' defaults; the floats may have another type."""
+    parameters = [(item.name, item.type.name, item.default) for item in type_.parameters]
+    return Numbers(numbers or str(type_.accelerator.numbers or ""), parameters)
+
+
 def _load(block: AcceleratorBlock, folder: Path) -> UserFunction:
     name = function_name(block.type)
     path = folder / block.type.accelerator.sources[0]
     parameters = ", ".join(parameter_names(block.type))
     hint = f"expected: {prototype(block.type)}"
     if block.type.accelerator.is_compiled:
-        return load_compiled(path, name, f"'{name}'", (parameters, hint), str(block.type.accelerator.numbers or ""))
+        return load_compiled(path, name, f"'{name}'", (parameters, hint), numbers_of(block.type))
     return load_function(path, name, f"'{name}'", parameters, hint)
 
 

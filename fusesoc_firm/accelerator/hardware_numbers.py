@@ -81,12 +81,20 @@ def _type(part: FrameField | Data, numbers: str) -> Callable[[Any], Any]:
     if wire.name == "bool":
         # An array of variable size has bytes.
         return np.uint8 if isinstance(part, Data) else bool
-    is_float = wire.name.startswith("float")
+    return _number_type(wire.name, numbers)
+
+
+def _number_type(name: str, numbers: str) -> Callable[[Any], Any]:
+    is_float = name.startswith("float")
     if is_float and (format_ := format_of(numbers)):
         return format_.number
-    name = numbers if numbers and is_float else wire.name
-    made: Callable[[Any], Any] = getattr(np, name)
+    made: Callable[[Any], Any] = getattr(np, numbers if numbers and is_float else name)
     return made
+
+
+def typed_number(name: str, value: float, numbers: str = "") -> Any:
+    """Return a number of the type with this name; floats have the type `numbers`, if it is given."""
+    return bool(value) if name == "bool" else _number_type(name, numbers)(value)
 
 
 def _typed(value: Any, path: tuple[str, ...], types: Mapping[tuple[str, ...], Callable[[Any], Any]]) -> Any:

@@ -52,7 +52,9 @@ def wanted_ports(type_: AcceleratorType) -> dict[str, WantedPort]:
         origin = f"{messages[prefix]}.{field[1]}" if field else messages[prefix]
         ports.append(WantedPort(f"{prefix}{port.name}", "out" if port.is_output else "in", port.width, origin))
     ports += [WantedPort(str(pin.name), pin.direction, pin.bits, "the pins") for pin in type_.accelerator.pins]
-    ports += [WantedPort(item.name, "in", item.port_bits, "the parameters") for item in type_.parameters]
+    ports += [
+        WantedPort(type_.parameter_port(item), "in", item.port_bits, "the parameters") for item in type_.parameters
+    ]
     return {port.name.lower(): port for port in ports}
 
 

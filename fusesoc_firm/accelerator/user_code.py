@@ -81,12 +81,30 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     return _loaded(path, name, what, (parameters, hint), run)
 
 
-def load_compiled(path: Path, name: str, what: str, form: tuple[str, str], numbers: str = "") -> UserFunction:
+@dataclass(frozen=True)
+class Numbers:
+    """The numbers of a compiled function: the type of its floats, if one is given, and its parameters.
+
+    A parameter is the name of an attribute of the object that is called, a type and a value.
+    """
+
+    type: str = ""
+    parameters: Sequence[tuple[str, str, float]] = ()
+
+
+def load_compiled(
+    path: Path, name: str, what: str, form: tuple[str, str], numbers: Numbers = Numbers()
+) -> UserFunction:
     """Load the function of an accelerator that is compiled: it computes with the numbers of hardware.
 
-    The `form` has the parameters and a hint, as those of `load_function`. Floats have the type `numbers`, if given.
+    The `form` has the parameters and a hint, as those of `load_function`.
     """
-    return _loaded(path, name, what, form, lambda module: _run_compiled(path, module, numbers))
+    from fusesoc_firm.accelerator.hardware_numbers import typed_number
+
+    function = _loaded(path, name, what, form, lambda module: _run_compiled(path, module, numbers.type))
+    for attribute, type_, value in numbers.parameters:
+        setattr(function.call, attribute, typed_number(type_, value, numbers.type))
+    return function
 
 
 def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callable[[ModuleType], None]) -> UserFunction:

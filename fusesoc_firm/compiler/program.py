@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, NoReturn
@@ -13,7 +13,7 @@ from fusesoc_firm.compiler.answers import Answer, AnswerMaker, Made
 from fusesoc_firm.compiler.conversions import Range, UnmergeableError, converted, widened
 from fusesoc_firm.compiler.front import Interpreter
 from fusesoc_firm.compiler.graph import Graph, Node
-from fusesoc_firm.compiler.interface import Side, message_value
+from fusesoc_firm.compiler.interface import Bits, Side, message_value
 from fusesoc_firm.compiler.kinds import Kind, number_of
 from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.source import Source, stored_attributes
@@ -47,6 +47,7 @@ class Program:
     loops: list[Loop]
     states: list[State]
     answers: list[Answer]
+    settings: Sequence[Setting] = ()
 
     def results(self) -> Iterator[Node]:
         """Yield all nodes whose values the hardware needs."""
@@ -93,6 +94,21 @@ class Program:
 
 
 @dataclass(frozen=True)
+class Setting:
+    """A number that is set from outside: an attribute of the function's object, and a port of the hardware.
+
+    It is at least `low` and at most `high`, and `default` at first.
+    """
+
+    name: str
+    port: str
+    kind: Kind
+    default: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Task:
     """A function to compile: its source and name, its messages, and the kind of its floats, if one is given."""
 
@@ -101,6 +117,7 @@ class Task:
     inputs: Sequence[Side]
     outputs: Sequence[Side]
     numbers: Kind | None = None
+    settings: Sequence[Setting] = ()
 
 
 def compile_function(task: Task) -> Program:
@@ -147,6 +164,8 @@ class _Run:
     def __init__(self, task: Task, states: dict[str, Range], assumed: Collection[str] = ()) -> None:
         self.name, self.inputs, self.outputs, self.states = task.name, task.inputs, task.outputs, states
         self.assumed = {*assumed}
+        self.numbers = task.numbers
+        self.settings = {f"{task.name}.{item.name}": item for item in task.settings}
         self.interpreter = Interpreter(task.source, on_global=self._enter)
         self.graph = self.interpreter.graph
         self.graph.format = task.numbers.format if task.numbers else None
@@ -191,6 +210,9 @@ class _Run:
         """Note the first values of the objects that a name of the module has, and put states in their place."""
         for path, owner, key, value in self._cells(name):
             self.first[path] = value
+            if path in self.settings:
+                self.first[path] = self.interpreter.memory.cells[owner][key] = self._setting(path, value)
+                continue
             known = self.states.get(path)
             if known is None and isinstance(value, Node) and not self.assumed.isdisjoint(_NAME.findall(path)):
                 known = Range(value.kind, (value.low, value.high))
@@ -198,6 +220,34 @@ class _Run:
                 leaf = self.graph.leaf("state", known.kind, path, known.limits)
                 self.leaves[path] = leaf
                 self.interpreter.memory.cells[owner][key] = leaf
+
+    def _setting(self, path: str, first: Value) -> Node:
+        """Return the value of a number that is set from outside. Raise `InputError` if its first value is another."""
+        item = self.settings[path]
+        is_fixed = self.numbers and self.numbers.format and item.kind.is_float
+        kind = self.numbers if self.numbers and is_fixed else item.kind
+        known = first.payload if isinstance(first, Node) and first.is_constant else None
+        if known is None or number_of(kind, known) != number_of(kind, item.default):
+            what = described(first) if known is None else known
+            self._refuse_setting(
+                f"'{path}' is {what} at first, and its default {item.default:.9g}", "use the same value"
+            )
+        limits = None if item.kind.is_float else (int(item.low), int(item.high))
+        made = self.graph.leaf("input", item.kind, Bits(item.port), limits)
+        return converted(self.graph, made, self.numbers) if self.numbers and item.kind.is_float else made
+
+    def _check_settings(self, after: Mapping[str, Value]) -> None:
+        """Refuse a number that is set from outside, and that the object lacks or changes."""
+        for path, item in self.settings.items():
+            if path not in after:
+                hint = "set it in __init__ of the object's class"
+                self._refuse_setting(f"'{self.name}' has no attribute '{item.name}' for the parameter", hint)
+            if after[path] is not self.first[path]:
+                self._refuse_state(path, "is a parameter, which the function cannot set", "use another attribute")
+
+    def _refuse_setting(self, message: str, hint: str) -> NoReturn:
+        source = self.interpreter.source
+        source.refuse(self.interpreter.definitions.get(self.name, source.module), message, hint)
 
     def _cells(self, name: str) -> Iterator[tuple[str, Any, Any, Value]]:
         """Yield the path, the owner, the key and the value of each number to which a name leads."""
@@ -220,6 +270,7 @@ class _Run:
         after = {path: value for name in self.interpreter.module_names for path, _, _, value in self._cells(name)}
         for path in self.first.keys() - after.keys():
             self._refuse_state(path, "is lost with a message", "keep the number of elements of lists")
+        self._check_settings(after)
         for path, value in after.items():
             if path not in self.first and path.endswith("]"):
                 hint = "use a list of fixed size, and replace its elements"
@@ -279,6 +330,7 @@ class _Run:
             sorted(self.interpreter.loops, key=lambda loop: loop.number),
             states,
             answers,
+            [*self.settings.values()],
         )
         program.drop_unused()
         for loop, name in late(program.loops, answers):

@@ -76,6 +76,7 @@ class Signals:
     def _reserved(self) -> Iterator[str]:
         """Yield the names that the template, VHDL and the ports have."""
         yield from (*_SIGNALS, *KEYWORDS, *VHDL_PREDEFINED)
+        yield from (item.port for item in self.program.settings)
         answers = self.program.answers
         yield from (own_signal(name, answer) for answer in answers for name in ("dropped", "segments"))
         for side in (*self.program.inputs, *(answer.side for answer in answers)):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.accelerator.functions import Functions, Message
+from fusesoc_firm.accelerator.functions import Functions, Message, numbers_of
 from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed
 from fusesoc_firm.accelerator.user_code import UserFunction, load_compiled
 from fusesoc_firm.frame.codec import CodecError, decode
@@ -113,7 +113,8 @@ def _answers(type_: AcceleratorType, folder: Path, calls: Sequence[Call], number
     """Yield the answers to all calls, as they are sent."""
     path, what = folder / type_.accelerator.sources[0], f"'{function_name(type_)}'"
     names = ", ".join(parameter_names(type_))
-    function = load_compiled(path, function_name(type_), what, (names, f"expected: {prototype(type_)}"), numbers)
+    form = (names, f"expected: {prototype(type_)}")
+    function = load_compiled(path, function_name(type_), what, form, numbers_of(type_, numbers))
     for number, call in enumerate(calls):
         when = f"message {number}, with numbers: {numbers}"
         with silent():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.accelerator.hardware_numbers import silent, typed
-from fusesoc_firm.accelerator.user_code import load_compiled
+from fusesoc_firm.accelerator.user_code import Numbers, load_compiled
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
@@ -26,7 +26,7 @@ _LIBRARY = MessageLibrary(ROS2)
 def accelerator(name: str, message: str, folder: str = "", numbers: str = "") -> Callable[[Mapping[str, Any]], Any]:
     """Return the function of a demo system, which receives messages with omitted fields left out."""
     path = SPECS / (folder or name) / "python" / f"{name}.py"
-    function = load_compiled(path, name, name, ("m", ""), numbers)
+    function = load_compiled(path, name, name, ("m", ""), Numbers(numbers))
     parsed = parse_name(message)
     frame = frame_of(parsed, _LIBRARY.closure(parsed))
 
@@ -163,7 +163,7 @@ def test_a_command_turns_to_what_is_seen() -> None:
     folder = SPECS / "perception" / "python"
 
     def function(file: str, name: str, *messages: str) -> Callable[..., Any]:
-        loaded = load_compiled(folder / file, name, name, ("m", "n"), "float32")
+        loaded = load_compiled(folder / file, name, name, ("m", "n"), Numbers("float32"))
         frames = [frame_of(parse_name(item), _LIBRARY.closure(parse_name(item))) for item in messages]
 
         def answer(*contents: Any) -> Any:

@@ -17,7 +17,7 @@ from typing import Any
 import chevron
 
 from fusesoc_firm.accelerator.hardware_numbers import plain, silent, typed
-from fusesoc_firm.accelerator.user_code import load_compiled
+from fusesoc_firm.accelerator.user_code import Numbers, load_compiled
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import kind_named
@@ -98,7 +98,7 @@ class Unit:
         """The answers of the function itself."""
         path = folder / f"{self.name}.py"
         path.write_text(self.text, encoding="utf-8")
-        function = load_compiled(path, self.name, self.name, ("m", ""), self.numbers)
+        function = load_compiled(path, self.name, self.name, ("m", ""), Numbers(self.numbers))
         found: list[dict[str, Any] | None] = []
         for message in messages:
             with silent():

@@ -281,6 +281,10 @@ class AcceleratorType:
             return f"{name}_bypass"
         return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
 
+    def parameter_port(self, parameter: Parameter) -> str:
+        """Return the name of a parameter's port; that of a compiled function is none of its own signals."""
+        return f"parameter_{parameter.name}" if self.accelerator.is_compiled else parameter.name
+
     @property
     def is_elsewhere(self) -> bool:
         """Whether the accelerator is software that runs in another program and is reached through topics."""

@@ -13,6 +13,7 @@ from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, Pa
 from fusesoc_firm.system.derived.pins import check_name, port_owners
 from fusesoc_firm.system.written.specification import (
     NO_STATUS,
+    PYTHON,
     STATUS_AXI_LITE,
     STATUS_FRAMES,
     Accelerator,
@@ -22,8 +23,8 @@ from fusesoc_firm.system.written.specification import (
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.yaml_text import Text
 
-# The types of accelerators whose units have ports for parameters.
-_LANGUAGES = ("VHDL", "Verilog")
+# The types of accelerators that may have parameters.
+_LANGUAGES = ("VHDL", "Verilog", PYTHON)
 _MOST = 1024
 _LARGEST_FLOAT = (2 - 2**-23) * 2.0**127
 

@@ -60,7 +60,7 @@ def _is_followed(source: MessageSide, segment: int) -> bool:
 def _pins(type_: AcceleratorType) -> list[Context]:
     """Return the ports of pins and parameters."""
     ports = [(str(pin.name), str(pin.direction), pin.bits) for pin in type_.accelerator.pins]
-    ports += [(item.name, "in", item.port_bits) for item in type_.parameters]
+    ports += [(type_.parameter_port(item), "in", item.port_bits) for item in type_.parameters]
     return [
         {"name": name, "direction": direction, "type": vhdl_type(bits), "comment": ""}
         for name, direction, bits in ports

@@ -7,16 +7,16 @@ from typing import NoReturn
 
 from fusesoc_firm.compiler.binding import bound
 from fusesoc_firm.compiler.interface import side_of
-from fusesoc_firm.compiler.kinds import kind_named
+from fusesoc_firm.compiler.kinds import KINDS, kind_named
 from fusesoc_firm.compiler.models import model_files
 from fusesoc_firm.compiler.operators import table_files
-from fusesoc_firm.compiler.program import Program, Task, compile_function
+from fusesoc_firm.compiler.program import Program, Setting, Task, compile_function
 from fusesoc_firm.compiler.schedule import RELEASE, Schedule
 from fusesoc_firm.compiler.source import Source
 from fusesoc_firm.compiler.writer import TEMPLATE, Writer
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, shown_path
-from fusesoc_firm.system.hardware.instances import declarations
+from fusesoc_firm.system.hardware.instances import declarations, parameter_declarations
 from fusesoc_firm.system.hardware.limits import (
     LATENCY,
     BudgetError,
@@ -39,7 +39,8 @@ def compiled(type_: AcceleratorType, folder: Path) -> Rendering:
 def entity_of(type_: AcceleratorType, schedule: Schedule) -> Rendering:
     """Return the template and configuration of an accelerator's entity with a schedule of its function."""
     writer = Writer(bound(schedule))
-    return Rendering(TEMPLATE, writer.configuration(type_.entity, declarations(type_), type_.width))
+    ports = [*declarations(type_), *parameter_declarations(type_)]
+    return Rendering(TEMPLATE, writer.configuration(type_.entity, ports, type_.width))
 
 
 def compiler_files() -> list[Path]:
@@ -119,4 +120,9 @@ def program_of(type_: AcceleratorType, folder: Path, numbers: str = "") -> Progr
     outputs = [
         side_of(side.prefix, side.frame, *([side.length.source.value] if side.length else [])) for side in type_.outputs
     ]
-    return compile_function(Task(Source(shown_path(path), text), function_name(type_), inputs, outputs, floats))
+    settings = [
+        Setting(item.name, type_.parameter_port(item), KINDS[item.type.name], item.default, item.least, item.most)
+        for item in type_.parameters
+    ]
+    source = Source(shown_path(path), text)
+    return compile_function(Task(source, function_name(type_), inputs, outputs, floats, settings))

@@ -242,7 +242,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
     for pin in type_.accelerator.pins:
         signal = names.synced if pin.is_synchronised else names.port
         ports.append((str(pin.name), signal(block.block, pin.name)))
-    ports += [(item.name, names.port(block.block, item.name)) for item in type_.parameters]
+    ports += [(type_.parameter_port(item), names.port(block.block, item.name)) for item in type_.parameters]
     return {
         "differences": ", ".join(differences),
         **instance(
@@ -277,7 +277,7 @@ def component(type_: AcceleratorType) -> dict[str, Any]:
     """Return the component declaration of an accelerator that is not an entity."""
     ports = [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
-    ports += [(item.name, False, item.port_bits) for item in type_.parameters]
+    ports += [(type_.parameter_port(item), False, item.port_bits) for item in type_.parameters]
     return {
         "entity": type_.entity,
         "has_width": type_.has_width,
@@ -298,4 +298,17 @@ def declarations(accelerator: AcceleratorType) -> list[dict[str, Any]]:
             "comment": port.comment,
         }
         for prefix, port in accelerator_ports(accelerator)
+    ]
+
+
+def parameter_declarations(accelerator: AcceleratorType) -> list[dict[str, Any]]:
+    """Return the declarations of the ports of an accelerator's parameters."""
+    return [
+        {
+            "name": accelerator.parameter_port(item),
+            "direction": "in",
+            "type": vhdl_type(item.port_bits),
+            "comment": f"the parameter {item.name}: {item.type.name}",
+        }
+        for item in accelerator.parameters
     ]

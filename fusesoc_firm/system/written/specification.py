@@ -324,9 +324,9 @@ class Pin(Section):
 
 @dataclass(frozen=True)
 class ParameterSection(Section):
-    """A number that ROS sets at run time: an input port of an accelerator, which changes between messages only."""
+    """A number that ROS sets at run time: a port or an attribute of an accelerator that changes between messages."""
 
-    name: Text = key("the port's name; the parameter of the node is <block>.<name>", is_required=True)
+    name: Text = key("name of the port or attribute; the parameter of the node is <block>.<name>", is_required=True)
     type: Text = key("the number's type", is_required=True, choices=PARAMETER_TYPES)
     default: Text = key("the value after reset", is_required=True)
     range: tuple[Text, ...] = key(
@@ -372,7 +372,7 @@ class Accelerator(Section):
     )
     pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
     parameters: tuple[ParameterSection, ...] = key(
-        "numbers that ROS sets at run time, as input ports of an accelerator in VHDL or Verilog",
+        "numbers that ROS sets at run time: input ports in VHDL and Verilog, attributes in Python",
         form="sections",
         section=ParameterSection,
         is_asked=False,
