@@ -72,7 +72,21 @@ def checked(
         return _checked_before(open_transport, description, registers, parameters)
     if description.has_status_frames:
         return _checked_by_frames(open_transport, description, parameters)
-    return open_transport
+    return _without_status(open_transport, parameters)
+
+
+def _without_status(open_transport: OpenTransport, parameters: HardwareParameters | None) -> OpenTransport:
+    """Return a function that opens a transport, unless the hardware needs other parameters than its defaults."""
+
+    def refuse(_: bytes) -> int:
+        raise TransportError("the node has no access to the registers of the parameters, which are at their defaults")
+
+    def opened(listener: HardwareListener) -> Transport:
+        if parameters:
+            parameters.restore(refuse)
+        return open_transport(listener)
+
+    return opened
 
 
 def _checked_before(

@@ -5,14 +5,18 @@ from __future__ import annotations
 import random
 import struct
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 import yaml
 
 from fusesoc_firm.node.engine import hardware_parameters as module
 from fusesoc_firm.node.engine.hardware_parameters import HardwareParameters
-from fusesoc_firm.node.interface.description import hardware_parameters
+from fusesoc_firm.node.interface.description import NodeDescription, hardware_parameters
+from fusesoc_firm.node.node import HardwareListener
+from fusesoc_firm.node.reopening import checked
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.status_frames import WRITE, answered, status_answer
 from fusesoc_firm.text.diagnostics import InputError
@@ -86,6 +90,22 @@ def test_hardware_that_does_not_answer() -> None:
     reason = parameters.set({"filter.gain": 2.0, "filter.order": 4}, hardware.access)
     assert reason == "no answer; no answer"
     assert parameters.values == {"filter.gain": 1.0, "filter.order": 2}
+
+
+def test_a_node_without_access_to_the_registers() -> None:
+    """A simulator of a system with registers for AXI4-Lite has none; defaults need no access."""
+    description = NodeDescription("robot", 8, (), (), (), digest="0" * 32, has_status_registers=True)
+    opened: list[HardwareListener] = []
+
+    def open_transport(listener: HardwareListener) -> Any:
+        opened.append(listener)
+
+    for values, is_legal in (({}, True), ({"filter.gain": 1.0}, True), ({"filter.gain": 2.0}, False)):
+        opener = checked(open_transport, description, parameters=HardwareParameters(PARAMETERS, values))
+        opened.clear()
+        with nullcontext() if is_legal else pytest.raises(TransportError, match="the node has no access to the reg"):
+            opener(cast("HardwareListener", None))
+        assert bool(opened) == is_legal
 
 
 def test_an_illegal_first_value() -> None:

@@ -404,6 +404,7 @@ class Engines {
 
   // Set parameters of the hardware; return the reason why they are refused, or an empty text.
   std::string set(const HardwareParameters::Values& values) {
+    if (!has_status()) return parameters_.set(values, &no_access);
     return parameters_.set(values, [this](const Bytes& request) {
       return status_word(access_status(request, std::chrono::seconds(5)));
     });
@@ -468,6 +469,7 @@ class Engines {
     return [this, address](const TransportOptions& options) {
       // Opening the transport would reset the hardware of another system.
       if (registers_) check_digest(*registers_, system_.digest, system_.name);
+      if (!has_status()) parameters_.restore(&no_access);
       auto transport = open_transport(address, options);
       if (registers_) {
         parameters_.restore([this](const Bytes& request) { return status_word(registers_->access(request)); });
@@ -479,6 +481,10 @@ class Engines {
       }
       return transport;
     };
+  }
+
+  static std::uint32_t no_access(const Bytes&) {
+    throw TransportError("the node has no access to the registers of the parameters, which are at their defaults");
   }
 
   static Node::Publish by_id(const std::vector<MessageHandler>& handlers) {
