@@ -35,10 +35,13 @@ ALLOWED: dict[str, str] = {
     "node": "accelerator core frame message system text tools",
     "runs": "accelerator converter core frame message node system text tools",
     "builds": "converter core fabric message node runs system text tools",
+    "ip_xact": "builds core netlist system text tools",
     "api": "accelerator builds frame message node runs system text",
     "studio": "accelerator builds converter core frame message node runs scheduling system text tools",
     "exploration": "accelerator compiler frame netlist noc runs studio system text tools",
-    "cli": "accelerator builds converter exploration fabric message node runs scheduling studio system text tools",
+    "cli": (
+        "accelerator builds converter exploration fabric ip_xact message node runs scheduling studio system text tools"
+    ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
 STOREYS = {

@@ -45,6 +45,7 @@ _MODULES = {
     "trace": "live",
     "status": "status",
     "registers": "status",
+    "ip-xact": "ip_xact",
     "why": "why",
     "graph": "project",
     "affected": "project",

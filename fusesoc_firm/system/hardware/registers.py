@@ -31,7 +31,10 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a register: `width` bits from bit `low`; `enable` is the path of an interrupt's enable field."""
+    """A field of a register: `width` bits from bit `low`; `enable` is the path of an interrupt's enable field.
+
+    Without `has_reset`, the description does not say what the field is after reset, and `reset` is 0.
+    """
 
     name: str
     low: int
@@ -40,6 +43,7 @@ class Field:
     kind: Kind
     is_writable: bool
     enable: str = ""
+    has_reset: bool = True
 
     def of(self, word: int) -> int:
         """Return the field's value in a register's word."""
@@ -112,6 +116,7 @@ def _field(node: FieldNode, top: AddrmapNode) -> Field:
         _kind(node),
         node.is_sw_writable,
         path,
+        reset is not None,
     )
 
 

@@ -1,0 +1,1 @@
+"""A core's target as an IP-XACT component, for block designs."""

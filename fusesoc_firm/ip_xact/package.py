@@ -1,0 +1,176 @@
+"""Package a target as an IP-XACT component: a folder with `component.xml` and the files that it names."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from fusesoc_firm.ip_xact.design import Design, is_verilog, is_vhdl, vlnv
+from fusesoc_firm.ip_xact.interfaces import infer
+from fusesoc_firm.ip_xact.model import Component, Generic, Port, SourceFile
+from fusesoc_firm.ip_xact.verilog_module import read_module
+from fusesoc_firm.ip_xact.vhdl_entity import Entity, read_entity
+from fusesoc_firm.ip_xact.writer import STANDARDS, gui_path, instance_name, write_component
+from fusesoc_firm.netlist.instantiated import entities
+from fusesoc_firm.system.derived.model import StatusAccess
+from fusesoc_firm.system.hardware.registers import Register
+from fusesoc_firm.system.system_core import status_registers
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import write
+from fusesoc_firm.text.render import render
+
+SOURCES, NETLIST = VIEWS = ("sources", "netlist")
+VIVADO = 2009
+_GUI_TEMPLATE = "ip_xact/xgui.tcl"
+_WORK = "work"
+# The types and endings of files that are neither VHDL nor Verilog but belong to the hardware.
+_OTHER_TYPES = ("xdc", "mem")
+_MEMORIES = (".mem", ".hex", ".mif", ".coe", ".dat")
+
+
+@dataclass(frozen=True)
+class Package:
+    """A component, and the place of each of its files."""
+
+    component: Component
+    places: Mapping[PurePosixPath, Path]
+
+
+def package(design: Design, view: str) -> Package:
+    """Return the component of a target, with its sources or with a Verilog netlist instead of its VHDL.
+
+    Raise `InputError` if the top unit cannot be read or has no ports, or if there is no netlist.
+    """
+    libraries = design.vhdl()
+    root = design.build.work_root
+    entity, needed = None, {name for names in libraries.values() for name in names}
+    if _is_vhdl(design):
+        entity, elaborated = read_entity(design.top, root, libraries, design.standard, design.parameters("generic"))
+        # GHDL knows no entities below a module in Verilog.
+        needed = needed if any(map(is_verilog, design.files)) else elaborated
+    if view == NETLIST and libraries:
+        netlist, others = _netlist(design)
+        files = [netlist, *others]
+    else:
+        files = [file for file in design.files if not is_vhdl(file) or file["name"] in needed]
+    generics, ports = _top(design, files, entity if view == SOURCES else None)
+    if view == NETLIST and entity:
+        generics, ports = [], _with_defaults(ports, entity)
+    if not ports:
+        fail(f"'{design.top}' has no ports, so it is no component", hint="name a target whose top unit is hardware")
+    places = {path: (file, root / file["name"]) for file in files if (path := _path(file, design))}
+    vendor, library, _, version = vlnv(design.build)
+    component = Component(
+        vendor,
+        library,
+        design.top.rpartition(".")[2],
+        version,
+        design.description,
+        "VHDL" if entity and view == SOURCES else "Verilog",
+        ports,
+        infer(ports, _registers(design), _frequencies(design)),
+        [_source_file(path, file) for path, (file, _) in places.items()],
+        generics,
+    )
+    return Package(component, {path: place for path, (_, place) in places.items()})
+
+
+def write_package(package: Package, year: int, folder: Path) -> None:
+    """Write `component.xml` in the standard of a year, and the files that it names. May raise `InputError`."""
+    for path, place in package.places.items():
+        write(folder / path, place.read_bytes())
+    if year == VIVADO:
+        write(folder / gui_path(package.component), _gui(package.component))
+    write(folder / "component.xml", write_component(package.component, STANDARDS[year]))
+
+
+def _gui(component: Component) -> str:
+    free = [{"name": generic.name} for generic in component.generics if generic.is_free]
+    return render(_GUI_TEMPLATE, {"instance": instance_name(component), "generics": free})
+
+
+def _is_vhdl(design: Design) -> bool:
+    """Return whether the top unit is an entity."""
+    files = {
+        library: [str(design.build.work_root / name) for name in names] for library, names in design.vhdl().items()
+    }
+    return design.top.rpartition(".")[2].lower() in {name.lower() for name in entities(files)}
+
+
+def _netlist(design: Design) -> tuple[Mapping[str, Any], Sequence[Mapping[str, Any]]]:
+    """Translate the VHDL of a target to Verilog; return the netlist's file, and the target's other files."""
+    from edalize.tools.ghdlsynth import Ghdlsynth
+
+    options = {
+        name: value for name, value in design.edam.get("flow_options", {}).items() if name in Ghdlsynth.TOOL_OPTIONS
+    }
+    tool = Ghdlsynth()
+    tool.work_root = str(design.build.work_root)
+    # The translation needs no programs of later steps.
+    tool.setup({**design.edam, "files": design.files, "tool_options": {"ghdlsynth": options}})
+    tool.write_config_files()
+    done = subprocess.run(
+        [sys.executable, "-m", "fusesoc_firm.netlist", f"{tool.name}.ghdlsynth"],
+        cwd=design.build.work_root,
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        check=False,
+    )
+    if done.returncode:
+        fail(f"there is no netlist of '{design.top}'", hint=done.stderr.strip())
+    netlist, *others = tool.edam["files"]
+    return {**netlist, "is_netlist": True}, others
+
+
+def _top(
+    design: Design, files: Sequence[Mapping[str, Any]], entity: Entity | None
+) -> tuple[Sequence[Generic], Sequence[Port]]:
+    if entity:
+        return entity.generics(), entity.ports()
+    verilog = [design.build.work_root / file["name"] for file in files if is_verilog(file)]
+    return read_module(design.top, verilog, design.parameters("vlogdefine"), design.parameters("vlogparam"))
+
+
+def _with_defaults(ports: Sequence[Port], entity: Entity) -> list[Port]:
+    """Return the ports of a netlist, in which no port has a default value, with the defaults of the entity."""
+    defaults = entity.defaults()
+    return [Port(port.name, port.direction, port.bounds, defaults.get(port.name)) for port in ports]
+
+
+def _path(file: Mapping[str, Any], design: Design) -> PurePosixPath | None:
+    """Return the path of a file in the component, or None if the file is not part of the hardware."""
+    type_, name = str(file.get("file_type", "")), PurePosixPath(file["name"])
+    is_hardware = is_verilog(file) or is_vhdl(file) or type_ in _OTHER_TYPES or name.suffix in _MEMORIES
+    if not is_hardware:
+        return None
+    if file.get("is_netlist"):
+        return PurePosixPath(f"src/{design.top.rpartition('.')[2]}_netlist.v")
+    if name.is_absolute() or ".." in name.parts:
+        return PurePosixPath("src", str(file.get("core", "")).replace(":", "_"), name.name)
+    return name
+
+
+def _source_file(path: PurePosixPath, file: Mapping[str, Any]) -> SourceFile:
+    library = str(file.get("logical_name") or "")
+    return SourceFile(path, str(file["file_type"]), library, bool(file.get("is_include_file")))
+
+
+def _registers(design: Design) -> Sequence[Register]:
+    """Return the registers at the AXI4-Lite interface of a system."""
+    loaded = design.system
+    is_mapped = loaded is not None and loaded.system.status is StatusAccess.AXI_LITE
+    return status_registers(loaded).registers if loaded and is_mapped else ()
+
+
+def _frequencies(design: Design) -> dict[str, int]:
+    """Return the frequencies of a system's clocks in Hz, by port."""
+    if not design.system:
+        return {}
+    system = design.system.system
+    clocks = {clock.port: clock.frequency for clock in system.clocks} | ({"clk": system.clock} if system.clock else {})
+    return {port: round(frequency) for port, frequency in clocks.items()}
