@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from fusesoc_firm.compiler.conversions import (
-    UnmergeableError,
     chosen,
     converted,
     integer_of,
@@ -167,10 +166,7 @@ class Arithmetic:
                 )
         if value.kind == BOOL and not value.is_constant and kind != BOOL:
             return converted(self.graph, integer_of(self.graph, value), kind)
-        try:
-            return converted(self.graph, value, kind)
-        except UnmergeableError as error:
-            raise RefusalError(f"{error} are not one kind of number") from None
+        return converted(self.graph, value, kind)
 
     def to(self, value: Node, kind: Kind) -> Node:
         """Return a number in another kind, as `numpy.KIND(value)` converts it."""

@@ -35,8 +35,6 @@ def converted(graph: Graph, value: Node, kind: Kind) -> Node:
         if value.kind.is_float:
             return _resized(graph, value, kind)
         return graph.node("to_float", (value,), kind)
-    if kind == BOOL:
-        raise UnmergeableError(f"a {value.kind} and a truth value")
     if kind.format:
         return _fixed(graph, value, kind)
     limits = (value.low, value.high)

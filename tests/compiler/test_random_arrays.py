@@ -29,7 +29,7 @@ SUMMARY = "float64 total\nint64 count\nfloat64[] values\n"
 # A longer message takes too long to simulate.
 _LARGEST = 400
 # What Python computes with the types of paths, or after a message, is none of these functions.
-_REFUSED = ("which follows it in the message", "are not one kind of number", "in one place")
+_REFUSED = ("which follows it in the message", "in one place")
 
 
 def _at(steps: tuple[str | int, ...]) -> str:
