@@ -8,15 +8,19 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 from fusesoc_firm.noc.hardware import TEMPLATE, exchange_configuration
 from fusesoc_firm.noc.mapping import mapped
-from fusesoc_firm.noc.model import Frame, latency, random_frames, throughput
+from fusesoc_firm.noc.model import Frame, latency, next_place, random_frames, throughput
 from fusesoc_firm.noc.network import Flow, Network, Topology, crossbar, mesh, tree
 from fusesoc_firm.text.render import render
+from tests.exploration.topic_systems import FABRICS, random_system, ratios
 from tests.hdl.ghdl import GhdlError, Library, core_files
+from tools.bench import floonoc
 from tools.bench.nextpnr import SEEDS, Nextpnr
 from tools.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tools.bench.yosys import SynthesisError
@@ -24,6 +28,7 @@ from tools.bench.yosys import SynthesisError
 AREA_TITLE = "Area and clock of routers and exchanges"
 MESH_TITLE = "Saturation of a 4 x 4 mesh"
 TRAFFIC_TITLE = "Exchanges beside the Manager"
+WORST_TITLE = "Worst case"
 
 _FOLDER = Path(__file__).parent
 _AREA_COLUMNS = ("design", "bits", "LUT4", "FF", "MHz", "of each seed", "bar LUT4", "bar MHz", "result")
@@ -33,6 +38,7 @@ _TRAFFIC_COLUMNS = (
     "endpoints",
     "figure",
     "Manager",
+    "wires",
     "crossbar",
     "mesh",
     "tree",
@@ -40,7 +46,12 @@ _TRAFFIC_COLUMNS = (
     "bar",
     "result",
 )
+_WORST_COLUMNS = ("exchange", "messages", "median", "of ten, nine are below", "greatest", "bar of the median", "result")
 _NOTES = {
+    WORST_TITLE: """The quotient of the bound on a message's time from its publisher to its reader, and of the slowest
+        message that 100 runs of the cycle model find, of 2,000 cycles each: sources that always have messages, or
+        pause, and readers that are slow up to their bounds. The systems are 200 random ones of up to eight
+        accelerators, with messages of 1 to 48 beats. No bound is below the slowest message.""",
     AREA_TITLE: """Routers are those of a 4 x 4 mesh with XY routing and flows from each endpoint to each other one.
         The flows of the crossbar are pipelines of four endpoints from endpoint 0 and back to it. Buffers have two
         beats.""",
@@ -52,7 +63,8 @@ _NOTES = {
         accelerators pass the Manager and an ideal host, which returns each frame without delay. In 'host', endpoint 0
         sends to all others and receives from them; 'uniform' is from each endpoint to each other one; 'neighbours' are
         pairs; 'pipelines' consist of four endpoints, from endpoint 0 and back to it; in 'four hosts', each of the
-        endpoints 0 to 3 has its own accelerators. The crossbar has only the turns that the flows need. The endpoints
+        endpoints 0 to 3 has its own accelerators. Wires carry a whole message in a cycle, which counts as
+        8 beats, and have a merge at each endpoint. The crossbar has only the turns that the flows need. The endpoints
         of the mesh are placed by annealing. The quotient is that of the crossbar and the Manager.""",
 }
 # LUT4 at most and MHz at least.
@@ -68,6 +80,7 @@ _AREA_BARS = {
 _MESH_BARS = {(2, 8): 0.45, (16, 8): 0.58}
 _SIZES = (4, 16, 64)
 # The least quotient of the saturations of the crossbar and the Manager.
+_WORST_BAR, _WORST_SYSTEMS, _WORST_RUNS, _WORST_CYCLES = 1.3, 200, 100, 2000
 _QUOTIENTS = {("pipelines", 16): 9.5, ("pipelines", 64): 60.0}
 _SATURATION, _LATENCY = "saturation", "latency"
 _BEATS, _LOAD, _CYCLES = 8, 0.2, 3000
@@ -77,14 +90,54 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row, by table."""
     return {
         AREA_TITLE: [(design, str(width)) for design, width in _AREA_BARS],
+        floonoc.TITLE: floonoc.keys(),
         MESH_TITLE: [(str(buffers), str(beats)) for buffers, beats in _mesh_sizes()],
         TRAFFIC_TITLE: [(name, str(count), figure) for name, count, figure in _traffic_rows()],
+        WORST_TITLE: [(fabric,) for fabric in ("all", *FABRICS)],
     }
 
 
 def measure(nextpnr: Nextpnr, tell: Tell, known: str, pattern: str, seeds: Sequence[int] = SEEDS) -> list[Table]:
     """Measure the rows whose names match; the others keep their figures in the text `known`."""
-    return [_areas(nextpnr, tell, known, pattern, seeds), _meshes(tell, known, pattern), _traffic(tell, known, pattern)]
+    areas = _areas(nextpnr, tell, known, pattern, seeds)
+    ours = partial(verilog_of, "router of five ports")
+    beside = floonoc.measure(nextpnr, tell, known, pattern, seeds, ours)
+    return [areas, beside, _meshes(tell, known, pattern), _traffic(tell, known, pattern), _worst(tell, known, pattern)]
+
+
+# --- worst case ------------------------------------------------------------------------------------------------------
+
+
+def _worst(tell: Tell, known: str, pattern: str) -> Table:
+    before = known_rows(known, WORST_TITLE, _WORST_COLUMNS, 1)
+    names = ("all", *FABRICS)
+    rows = [before.get((name,), (name, *[""] * 5, NOT_MEASURED)) for name in names]
+    if any(re.search(pattern, f"worst case of {name}") for name in names):
+        found = _worst_ratios()
+        rows = [(name, *_spread(found[name], is_barred=name == "all")) for name in names]
+        for row in rows:
+            tell(" ".join(row))
+    return Table(WORST_TITLE, _WORST_COLUMNS, tuple(rows), _NOTES[WORST_TITLE])
+
+
+def _worst_ratios() -> dict[str, list[float]]:
+    """Return the quotients of all messages, by the kind of exchange and of all."""
+    found: dict[str, list[float]] = {name: [] for name in ("all", *FABRICS)}
+    for number in range(_WORST_SYSTEMS):
+        with tempfile.TemporaryDirectory() as name:
+            loaded = random_system(random.Random(f"worst case {number}"), Path(name))
+            quotients = ratios(loaded, number, _WORST_RUNS, _WORST_CYCLES)
+        for kind in ("all", str(loaded.specification.project.fabric)):
+            found[kind] += quotients
+    return found
+
+
+def _spread(quotients: Sequence[float], *, is_barred: bool) -> tuple[str, ...]:
+    ordered = sorted(quotients)
+    middle = median(ordered)
+    figures = (middle, ordered[len(ordered) * 9 // 10], ordered[-1])
+    limits = (f"<= {_WORST_BAR}", MET if middle <= _WORST_BAR else MISSED) if is_barred else ("", "")
+    return (str(len(ordered)), *(f"{figure:.2f}" for figure in figures), *limits)
 
 
 # --- area and clock --------------------------------------------------------------------------------------------------
@@ -223,7 +276,7 @@ def _traffic(tell: Tell, known: str, pattern: str) -> Table:
     rows = []
     for name, endpoints, figure in _traffic_rows():
         key = (name, str(endpoints), figure)
-        row = before.get(key, (*key, "", "", "", "", "", "", NOT_MEASURED))
+        row = before.get(key, (*key, *[""] * 7, NOT_MEASURED))
         if re.search(pattern, f"{name} of {endpoints} {figure}"):
             row = (*key, *_compared(name, endpoints, figure))
             tell(" ".join(row))
@@ -237,10 +290,15 @@ def _compared(name: str, endpoints: int, figure: str) -> tuple[str, ...]:
     side = round(endpoints**0.5)
     networks = [_network(crossbar(endpoints), flows), _mapped(mesh(side, side), flows), _mapped(tree(endpoints), flows)]
     if figure == _LATENCY:
-        found = [Relays(networks[0]).latency(), *(latency(made, _LOAD, cycles=_CYCLES) for made in networks)]
-        return (*(f"{cycles:.1f}" for cycles in found), f"{found[1] / found[0]:.2f}", "", "")
-    rates = [Relays(networks[0]).throughput(), *(throughput(made, cycles=_CYCLES) for made in networks)]
-    quotient = rates[1] / rates[0]
+        found = [
+            Relays(networks[0]).latency(),
+            Wires(networks[0]).latency(),
+            *(latency(made, _LOAD, cycles=_CYCLES) for made in networks),
+        ]
+        return (*(f"{cycles:.1f}" for cycles in found), f"{found[2] / found[0]:.2f}", "", "")
+    ways = (Relays(networks[0]), Wires(networks[0]))
+    rates = [*(way.throughput() for way in ways), *(throughput(made, cycles=_CYCLES) for made in networks)]
+    quotient = rates[2] / rates[0]
     bar = _QUOTIENTS.get((name, endpoints))
     limits = (f">= {bar:g}", MET if quotient >= bar else MISSED) if bar else ("", "")
     return (*(f"{rate:.2f}" for rate in rates), f"{quotient:.1f}", *limits)
@@ -248,6 +306,50 @@ def _compared(name: str, endpoints: int, figure: str) -> tuple[str, ...]:
 
 def _mapped(topology: Topology, flows: tuple[Flow, ...]) -> Network:
     return Network(topology, mapped(topology, len(topology.slots), flows), flows)
+
+
+@dataclass(frozen=True)
+class Wires:
+    """Wires for each flow, and a merge at each sink; a message passes in a cycle."""
+
+    network: Network
+
+    def throughput(self) -> float:
+        """Return the beats that all endpoints receive in a cycle if each source always has a message."""
+        choice, first = random.Random(1), _CYCLES // 5
+        frames: list[Frame] = []
+        for source in range(self.network.endpoints):
+            flows = [place for place, flow in enumerate(self.network.flows) if flow.source == source]
+            frames += [Frame(0, choice.choice(flows), _BEATS) for _ in range(_CYCLES) if flows]
+        return sum(cycle >= first for cycle, _ in self._arrivals(frames)) * _BEATS / (_CYCLES - first)
+
+    def latency(self) -> float:
+        """Return the mean cycles from the cycle in which a message is due to the one in which it arrives."""
+        frames = random_frames(self.network, _LOAD, _BEATS, _CYCLES)
+        waits = [cycle + 1 - frame.cycle for cycle, frame in self._arrivals(frames) if frame.cycle < _CYCLES * 4 // 5]
+        return sum(waits) / len(waits)
+
+    def _arrivals(self, frames: Sequence[Frame]) -> Iterator[tuple[int, Frame]]:
+        """Yield the cycle of each arrival, and the frame; each merge turns as `firm_message_merge` does."""
+        left: dict[int, deque[Frame]] = {}
+        for frame in frames:
+            left.setdefault(self.network.flows[frame.flow].source, deque()).append(frame)
+        turns: dict[int, int] = {}
+        for cycle in range(_CYCLES):
+            waiting: dict[int, list[int]] = {}
+            for source, messages in left.items():
+                if messages and messages[0].cycle <= cycle:
+                    (sink,) = self.network.flows[messages[0].flow].sinks
+                    waiting.setdefault(sink, []).append(source)
+            for sink, sources in waiting.items():
+                # A sink of one source needs no merge.
+                turn = turns.get(sink, self._first_source(sink))
+                if turn in sources:
+                    yield cycle, left[turn].popleft()
+                turns[sink] = next_place(sources, turn)
+
+    def _first_source(self, sink: int) -> int:
+        return min(flow.source for flow in self.network.flows if sink in flow.sinks)
 
 
 @dataclass(frozen=True)
