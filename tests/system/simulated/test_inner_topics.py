@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import shutil
 import subprocess
 from collections.abc import Collection, Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.exploration.worst_case import worst_times
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.noc.model import Beat, Model
 from fusesoc_firm.noc.network import Network
@@ -369,6 +371,28 @@ def test_an_exchange_answers_every_message(tmp_path: Path, case: str, fabric: st
     assert (tmp_path / "work" / "inner_system_exchange.vhd").is_file()
     for seed, stalls in ((1, 0), (2, 25), (3, 70)):
         assert system.passes(SEED=seed, STALL_PERCENT=stalls)
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("width", [8, 64])
+@pytest.mark.parametrize(
+    ("case", "fabric"), [("1:2", "wires"), ("2:1", "crossbar"), ("2:2", "mesh"), ("pipeline", "crossbar")]
+)
+def test_no_message_takes_longer_than_its_bound(tmp_path: Path, case: str, fabric: str, width: int) -> None:
+    """If the host sends and takes a beat in each cycle."""
+    system = CASES[case].build(tmp_path, width, fabric=fabric, scheduler="round_robin")
+    specification = yaml.safe_load((tmp_path / "inner.yaml").read_text())
+    for type_ in specification["accelerators"]:
+        type_ |= {"latency": 1, "interval": 2}
+    (tmp_path / "declared.yaml").write_text(yaml.safe_dump(specification, sort_keys=False))
+    loaded = load_beside(tmp_path / "declared.yaml")
+    bounds = [item for item in worst_times(loaded) if not item.topic]
+    assert all(item.cycles for item in bounds), bounds
+    result = system.run(SEED=1, STALL_PERCENT=0, SHOWN=10 * COUNT)
+    first_beats = re.findall(r"(\d+) last beat in to first beat out", result.output)
+    beats = max(item.transfer_time or 0 for item in loaded.system.scheduling.times)
+    slowest = max(map(int, first_beats)) + beats - 1
+    assert slowest <= max(item.cycles or 0 for item in bounds) < 7 * slowest
 
 
 @pytest.mark.parametrize(("fabric", "frames"), [("crossbar", 1), ("mesh", 2)])
