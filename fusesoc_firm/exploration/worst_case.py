@@ -105,6 +105,8 @@ class WorstTimes:
     loaded: LoadedSystem
     responses: Mapping[str, int]
     _entries: dict[End, _Entry | _UnboundedError] = field(default_factory=dict)
+    # The sources on the way that is followed.
+    _followed: list[End] = field(default_factory=list)
 
     def topics(self) -> Iterator[WorstTime]:
         """Yield the bounds of topics within the FPGA."""
@@ -286,7 +288,13 @@ class WorstTimes:
 
         The sinks have taken the last one by cycle 0.
         """
-        return max(self._through(sink, publisher, offered) for sink in self._leading(source, publisher))
+        if source in self._followed:
+            raise _UnboundedError(f"messages return to '{source.block}'")
+        self._followed.append(source)
+        try:
+            return max(self._through(sink, publisher, offered) for sink in self._leading(source, publisher))
+        finally:
+            self._followed.pop()
 
     def _leading(self, source: End, publisher: str) -> list[End]:
         """Return the sinks of a source from which a publisher is reached."""

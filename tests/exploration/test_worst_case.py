@@ -110,6 +110,26 @@ def test_reasons(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("overflow", "reason"),
+    [("block", "messages wait for each other at 'total_in_queue'"), ("drop_oldest", "messages return to 'sum'")],
+)
+def test_messages_that_return_have_no_bound(tmp_path: Path, overflow: str, reason: str) -> None:
+    point = "geometry_msgs/Point"
+    type_, block = accelerator("sum", point, point, 3)
+    type_["interface"]["input"] *= 2
+    blocks = [
+        converter("raw", "subscriber", point, outgoing=[{"name": "sum"}]),
+        block,
+        converter("sum_out", "publisher", point, topic="total"),
+        converter(
+            "total_in", "subscriber", point, topic="total", queue=2, overflow=overflow, outgoing=[{"name": "sum"}]
+        ),
+    ]
+    (found,) = [item for item in worst_times(loaded({}, [type_], blocks, tmp_path)) if not item.topic]
+    assert (found.cycles, found.reason) == (None, reason)
+
+
 def test_it_is_shown(tmp_path: Path, capsys: Captured) -> None:
     pipeline(tmp_path, "crossbar")
     with chdir(tmp_path):
