@@ -75,6 +75,11 @@ class Design:
     system: LoadedSystem | None
 
     @property
+    def unit(self) -> str:
+        """The top unit without its library."""
+        return self.top.rpartition(".")[2]
+
+    @property
     def files(self) -> Sequence[Mapping[str, Any]]:
         """The files of the hardware, without those of its simulation."""
         return [file for file in self.edam["files"] if "simulation" not in file.get("tags", [])]

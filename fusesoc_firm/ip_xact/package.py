@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -26,7 +26,6 @@ from fusesoc_firm.text.render import render
 SOURCES, NETLIST = VIEWS = ("sources", "netlist")
 VIVADO = 2009
 _GUI_TEMPLATE = "ip_xact/xgui.tcl"
-_WORK = "work"
 # The types and endings of files that are neither VHDL nor Verilog but belong to the hardware.
 _OTHER_TYPES = ("xdc", "mem")
 _MEMORIES = (".mem", ".hex", ".mif", ".coe", ".dat")
@@ -45,38 +44,26 @@ def package(design: Design, view: str) -> Package:
 
     Raise `InputError` if the top unit cannot be read or has no ports, or if there is no netlist.
     """
-    libraries = design.vhdl()
-    root = design.build.work_root
-    entity, needed = None, {name for names in libraries.values() for name in names}
-    if _is_vhdl(design):
-        entity, elaborated = read_entity(design.top, root, libraries, design.standard, design.parameters("generic"))
-        # GHDL knows no entities below a module in Verilog.
-        needed = needed if any(map(is_verilog, design.files)) else elaborated
-    if view == NETLIST and libraries:
-        netlist, others = _netlist(design)
-        files = [netlist, *others]
-    else:
-        files = [file for file in design.files if not is_vhdl(file) or file["name"] in needed]
-    generics, ports = _top(design, files, entity if view == SOURCES else None)
-    if view == NETLIST and entity:
-        generics, ports = [], _with_defaults(ports, entity)
+    entity, needed = _entity(design)
+    files = _netlist(design) if view == NETLIST and design.vhdl() else _sources(design, needed)
+    generics, ports = _interface(design, files, entity, view)
     if not ports:
         fail(f"'{design.top}' has no ports, so it is no component", hint="name a target whose top unit is hardware")
-    places = {path: (file, root / file["name"]) for file in files if (path := _path(file, design))}
+    paths = [(path, file) for file in files if (path := _path(file, design))]
     vendor, library, _, version = vlnv(design.build)
     component = Component(
         vendor,
         library,
-        design.top.rpartition(".")[2],
+        design.unit,
         version,
         design.description,
         "VHDL" if entity and view == SOURCES else "Verilog",
         ports,
         infer(ports, _registers(design), _frequencies(design)),
-        [_source_file(path, file) for path, (file, _) in places.items()],
+        [_source_file(path, file) for path, file in paths],
         generics,
     )
-    return Package(component, {path: place for path, (_, place) in places.items()})
+    return Package(component, {path: design.build.work_root / file["name"] for path, file in paths})
 
 
 def write_package(package: Package, year: int, folder: Path) -> None:
@@ -93,16 +80,24 @@ def _gui(component: Component) -> str:
     return render(_GUI_TEMPLATE, {"instance": instance_name(component), "generics": free})
 
 
-def _is_vhdl(design: Design) -> bool:
-    """Return whether the top unit is an entity."""
-    files = {
-        library: [str(design.build.work_root / name) for name in names] for library, names in design.vhdl().items()
-    }
-    return design.top.rpartition(".")[2].lower() in {name.lower() for name in entities(files)}
+def _entity(design: Design) -> tuple[Entity | None, Container[str]]:
+    """Return the top unit if it is an entity, and the VHDL files that the design needs."""
+    libraries, root = design.vhdl(), design.build.work_root
+    known = entities({library: [str(root / name) for name in names] for library, names in libraries.items()})
+    whole = {name for names in libraries.values() for name in names}
+    if design.unit.lower() not in {name.lower() for name in known}:
+        return None, whole
+    entity, needed = read_entity(design.top, root, libraries, design.standard, design.parameters("generic"))
+    # GHDL knows no entities below a module in Verilog.
+    return entity, whole if any(map(is_verilog, design.files)) else needed
 
 
-def _netlist(design: Design) -> tuple[Mapping[str, Any], Sequence[Mapping[str, Any]]]:
-    """Translate the VHDL of a target to Verilog; return the netlist's file, and the target's other files."""
+def _sources(design: Design, needed: Container[str]) -> Sequence[Mapping[str, Any]]:
+    return [file for file in design.files if not is_vhdl(file) or file["name"] in needed]
+
+
+def _netlist(design: Design) -> Sequence[Mapping[str, Any]]:
+    """Translate the VHDL of a target to Verilog; return the netlist's file and the target's other files."""
     from edalize.tools.ghdlsynth import Ghdlsynth
 
     options = {
@@ -124,16 +119,19 @@ def _netlist(design: Design) -> tuple[Mapping[str, Any], Sequence[Mapping[str, A
     if done.returncode:
         fail(f"there is no netlist of '{design.top}'", hint=done.stderr.strip())
     netlist, *others = tool.edam["files"]
-    return {**netlist, "is_netlist": True}, others
+    return [{**netlist, "is_netlist": True}, *others]
 
 
-def _top(
-    design: Design, files: Sequence[Mapping[str, Any]], entity: Entity | None
+def _interface(
+    design: Design, files: Sequence[Mapping[str, Any]], entity: Entity | None, view: str
 ) -> tuple[Sequence[Generic], Sequence[Port]]:
-    if entity:
+    """Return the generics and ports of the top unit in these files; those of a netlist are fixed."""
+    if entity and view == SOURCES:
         return entity.generics(), entity.ports()
     verilog = [design.build.work_root / file["name"] for file in files if is_verilog(file)]
-    return read_module(design.top, verilog, design.parameters("vlogdefine"), design.parameters("vlogparam"))
+    parameters = {} if entity else design.parameters("vlogparam")
+    generics, ports = read_module(design.unit, verilog, design.parameters("vlogdefine"), parameters)
+    return ([], _with_defaults(ports, entity)) if entity else (generics, ports)
 
 
 def _with_defaults(ports: Sequence[Port], entity: Entity) -> list[Port]:
@@ -149,7 +147,7 @@ def _path(file: Mapping[str, Any], design: Design) -> PurePosixPath | None:
     if not is_hardware:
         return None
     if file.get("is_netlist"):
-        return PurePosixPath(f"src/{design.top.rpartition('.')[2]}_netlist.v")
+        return PurePosixPath(f"src/{design.unit}_netlist.v")
     if name.is_absolute() or ".." in name.parts:
         return PurePosixPath("src", str(file.get("core", "")).replace(":", "_"), name.name)
     return name

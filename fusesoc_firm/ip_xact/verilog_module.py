@@ -28,9 +28,9 @@ def read_module(
         fail("Yosys is not installed, which reads the ports", hint=ways("yosys"))
     with tempfile.TemporaryDirectory() as folder:
         yosys = Yosys(program, Path(folder), defines)
-        values = "".join(f" -chparam {parameter} {_word(value)}" for parameter, value in parameters.items())
-        # Bodies are irrelevant, and take most of the time.
-        script = yosys.reading(paths, "-lib") + (f"; hierarchy -top {name}{values}" if values else "")
+        values = "".join(f" -set {parameter} {_word(value)}" for parameter, value in parameters.items())
+        # Bodies are irrelevant, and take most of the time; a module without a body has no parameters to set.
+        script = f"{yosys.reading(paths)}; chparam{values} {name}; blackbox" if values else yosys.reading(paths, "-lib")
         module = yosys.modules(script).get(name)
         if module is None:
             message = yosys.run(script).stderr.strip()
@@ -44,8 +44,8 @@ def read_module(
 
 
 def _word(value: str) -> str:
-    """Return a parameter's value in a script, in which a string has quotation marks of its own."""
-    return value if re.fullmatch(r"-?\d+|\d+'s?[bdh]\w+", value) else f'"\\"{value}\\""'
+    """Return a parameter's value in a script of Yosys."""
+    return value if re.fullmatch(r"-?\d+|\d+'s?[bdh]\w+", value) else f'"{value}"'
 
 
 def _port(name: str, data: Mapping[str, Any]) -> Port:
