@@ -19,7 +19,7 @@ from fusesoc_firm.netlist.instantiated import entities
 from fusesoc_firm.system.derived.model import StatusAccess
 from fusesoc_firm.system.hardware.registers import Register
 from fusesoc_firm.system.system_core import status_registers
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import fail, nearest
 from fusesoc_firm.text.outputs import write
 from fusesoc_firm.text.render import render
 
@@ -85,11 +85,14 @@ def _entity(design: Design) -> tuple[Entity | None, Container[str]]:
     libraries, root = design.vhdl(), design.build.work_root
     known = entities({library: [str(root / name) for name in names] for library, names in libraries.items()})
     whole = {name for names in libraries.values() for name in names}
+    has_verilog = any(map(is_verilog, design.files))
     if design.unit.lower() not in {name.lower() for name in known}:
+        if not has_verilog:
+            fail(f"the sources of {design.build} have no entity '{design.unit}'", hint=nearest(design.unit, known))
         return None, whole
     entity, needed = read_entity(design.top, root, libraries, design.standard, design.parameters("generic"))
     # GHDL knows no entities below a module in Verilog.
-    return entity, whole if any(map(is_verilog, design.files)) else needed
+    return entity, whole if has_verilog else needed
 
 
 def _sources(design: Design, needed: Container[str]) -> Sequence[Mapping[str, Any]]:

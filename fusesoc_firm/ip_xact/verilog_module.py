@@ -30,7 +30,8 @@ def read_module(
         yosys = Yosys(program, Path(folder), defines)
         values = "".join(f" -set {parameter} {_word(value)}" for parameter, value in parameters.items())
         # Bodies are irrelevant, and take most of the time; a module without a body has no parameters to set.
-        script = f"{yosys.reading(paths)}; chparam{values} {name}; blackbox" if values else yosys.reading(paths, "-lib")
+        whole = f"{yosys.reading(paths, '-noblackbox')}; chparam{values} {name}; blackbox"
+        script = whole if values else yosys.reading(paths, "-lib")
         module = yosys.modules(script).get(name)
         if module is None:
             message = yosys.run(script).stderr.strip()

@@ -101,7 +101,7 @@ class ComponentFile:
     def registers(self) -> dict[int, dict[str, tuple[int, int, str, bool]]]:
         """By address, the fields: lowest bit, width, access, and whether writing a one clears the field."""
         return {
-            int(self.text("addressOffset", register).replace("'h", "0x"), 16): {
+            _number(self.text("addressOffset", register)): {
                 self.text("name", field): (
                     int(self.text("bitOffset", field)),
                     int(self.text("bitWidth", field)),
@@ -114,9 +114,31 @@ class ComponentFile:
         }
 
     @property
+    def resets(self) -> dict[int, dict[str, int]]:
+        """By address, the fields with a known value after reset; in 1685-2009, the register has value and mask."""
+        found: dict[int, dict[str, int]] = {}
+        for register in self.find("memoryMaps/memoryMap/addressBlock/register"):
+            fields = found.setdefault(_number(self.text("addressOffset", register)), {})
+            value, mask = (
+                _number("".join(self.find(f"reset/{word}/text()", register)) or "0") for word in ("value", "mask")
+            )
+            for field in self.find("field", register):
+                low, width = (int(self.text(word, field)) for word in ("bitOffset", "bitWidth"))
+                bits = (1 << width) - 1
+                own = self.find("resets/reset/value/text()", field)
+                if own or mask >> low & bits == bits:
+                    fields[self.text("name", field)] = _number(own[0]) if own else value >> low & bits
+        return found
+
+    @property
     def files(self) -> list[str]:
         """The files of the first set, which is that of the synthesis."""
         return [str(name) for name in self.find("file/name/text()", self.find("fileSets/fileSet")[0])]
+
+
+def _number(text: str) -> int:
+    """A hexadecimal number as in IP-XACT before 2014, or as in SystemVerilog."""
+    return int(text.replace("'h", "0x"), 16)
 
 
 def read_component(folder: Path, year: int = 2009) -> ComponentFile:

@@ -147,13 +147,17 @@ def ghdl(command: str, *words: str, work: Path) -> None:
     assert not done.returncode, done.stderr
 
 
-def rdl_fields(spec: Path, folder: Path) -> dict[int, dict[str, tuple[int, int, str, bool]]]:
-    """The registers in a system's SystemRDL, by address, in the form of `ComponentFile.registers`."""
+def rdl_registers(spec: Path, folder: Path) -> list[RegNode]:
+    """The registers in a system's SystemRDL."""
     path = folder / "status.rdl"
     path.write_text(status_text(load_beside(spec, [], None)), encoding="utf-8")
     compiler = RDLCompiler()
     compiler.compile_file(str(path))
-    registers = [node for node in compiler.elaborate().top.descendants(unroll=True) if isinstance(node, RegNode)]
+    return [node for node in compiler.elaborate().top.descendants(unroll=True) if isinstance(node, RegNode)]
+
+
+def rdl_fields(registers: list[RegNode]) -> dict[int, dict[str, tuple[int, int, str, bool]]]:
+    """The fields by address, in the form of `ComponentFile.registers`."""
     return {
         register.absolute_address: {
             field.inst_name: (
@@ -163,6 +167,16 @@ def rdl_fields(spec: Path, folder: Path) -> dict[int, dict[str, tuple[int, int, 
                 field.get_property("onwrite") is not None,
             )
             for field in register.fields()
+        }
+        for register in registers
+    }
+
+
+def rdl_resets(registers: list[RegNode]) -> dict[int, dict[str, object]]:
+    """The values after reset by address, in the form of `ComponentFile.resets`."""
+    return {
+        register.absolute_address: {
+            field.inst_name: value for field in register.fields() if (value := field.get_property("reset")) is not None
         }
         for register in registers
     }
@@ -182,7 +196,7 @@ def write_system(folder: Path) -> Path:
 
 
 def write_converter(folder: Path, message: str, *, is_subscriber: bool, width: int = 8) -> str:
-    name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", message).replace("/", "_").lower()
+    name = message.replace("/", "_").lower()
     top = f"axis_to_{name}" if is_subscriber else f"{name}_to_axis"
     path = folder / f"{top}_{width}" / "converter.core"
     path.parent.mkdir()
@@ -209,11 +223,12 @@ def test_a_system(tmp_path: Path) -> None:
     assert sources.defaults["s_axis_tuser"] == 0
     # Only what the system uses is packaged.
     assert not [name for name in sources.files if "firm_net" in name]
-    registers = rdl_fields(spec, tmp_path)
+    registers = rdl_registers(spec, tmp_path)
     assert len(registers) > 20
     for folder, year in (("sources", 2009), ("netlist", 2009), ("of_2014", 2014), ("of_2022", 2022)):
         found = read_component(Path(folder), year)
-        assert found.registers == registers
+        assert found.registers == rdl_fields(registers)
+        assert found.resets == rdl_resets(registers)
         assert found.text("memoryMaps/memoryMap/addressBlock/range") == str(2**16)
 
 
@@ -365,7 +380,11 @@ def test_faults(tmp_path: Path, capsys: Captured) -> None:
     assert "add 'toplevel: UNIT' to the target" in none
     assert "unknown core 'me:robots:other'" in fault(capsys, "me:robots:other")
     path = Path(core)
-    path.write_text(path.read_text(encoding="utf-8").replace("width: 8", "width: 9"), encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("toplevel: axis_to_std", "toplevel: axis_to_sdt"), encoding="utf-8")
+    wrong = fault(capsys, core)
+    assert "have no entity 'axis_to_sdt_msgs_bool'\n      = did you mean 'axis_to_std_msgs_bool'?" in wrong
+    path.write_text(text.replace("width: 8", "width: 9"), encoding="utf-8")
     wrong = fault(capsys, core)
     assert "converter.core:9:" in wrong
     assert "FuseSoC cannot set up me:robots:axis_to_std_msgs_bool_8:1.0 default" in wrong
