@@ -18,6 +18,7 @@ from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef
+from fusesoc_firm.tools.reads import Reads, noted
 
 POINT = MessageName("geometry_msgs", "Point")
 
@@ -112,6 +113,10 @@ def test_definitions_of_a_distribution_are_kept(tmp_path: Path, monkeypatch: pyt
         loaded.clear()
         assert text() == text() == "float64 x\nfloat64 y\nfloat64 z\n"
         assert len(loaded) == 1
+    reads = Reads()
+    with noted(reads):
+        text()
+    assert not [path for path in (*reads.files, *reads.folders) if path.startswith(str(tmp_path))]
     file.unlink()
     file.parent.rmdir()
     file.parent.write_text("not a folder")
