@@ -8,7 +8,7 @@ import pytest
 
 from tools.bench import holoso, kernels
 from tools.bench.kernels import Bars, Compiled
-from tools.bench.nextpnr import Nextpnr, Placement
+from tools.bench.nextpnr import Nextpnr, Placement, TooLargeError
 from tools.bench.tables import MET, MISSED, NOT_MEASURED, Table
 from tools.bench.yosys import Cells, Yosys
 
@@ -59,3 +59,15 @@ def test_without_holoso_its_rows_are_those_of_the_page(monkeypatch: pytest.Monke
     assert rows["pid", holoso.OURS][2:6] == ("52", "120.0", "0.43", "1000")
     assert rows["pid", "Holoso, all stages"][-1] == NOT_MEASURED
     assert set(rows) == set(holoso.keys()[holoso.TITLE])
+
+
+def test_a_kernel_that_no_device_holds_has_its_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """nextpnr refuses it, which is a result, and its cells are those that Yosys has mapped."""
+
+    def without_place(*_: object) -> Placement:
+        raise TooLargeError("no BELs remaining", Cells(lut=21000, ff=10000, memory=500, dsp=181))
+
+    monkeypatch.setattr(Nextpnr, "place", without_place)
+    made = {"kernel": "k", "stages": "none", "folder": str(tmp_path), "top": "k", "cycles": 178, "version": "1"}
+    row = holoso._placed(made, Nextpnr(Yosys()), print, (1,))
+    assert row == ("178", holoso.TOO_LARGE, "", "21500", "10000", "181", "", "1")

@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm import __version__
 from tools.bench.nextpnr import Nextpnr, Placement, TooLargeError
@@ -94,7 +95,7 @@ def _peers(
     return found
 
 
-def _placed(made: Mapping[str, str], nextpnr: Nextpnr, tell: Tell, seeds: Sequence[int]) -> tuple[str, ...]:
+def _placed(made: Mapping[str, Any], nextpnr: Nextpnr, tell: Tell, seeds: Sequence[int]) -> tuple[str, ...]:
     verilog = "\n".join(path.read_text(encoding="utf-8") for path in sorted(Path(made["folder"]).glob("*.v")))
     try:
         figures = Figures(int(made["cycles"]), nextpnr.place(verilog, made["top"], seeds))
