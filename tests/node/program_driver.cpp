@@ -25,6 +25,7 @@ class Alone {
       std::cout << name << " " << std::string(data, data + size) << std::endl;
     };
   }
+  void offer(firm::HardwareParameters&, firm::SetParameters) {}
   void serve(const firm::Service&, firm::CallHandler) {}
   firm::CallHandler caller(const firm::Service&) { return nullptr; }
   void stop_calls() {}
