@@ -74,7 +74,8 @@ def test_boards_that_the_system_fits_are_offered(studio: Studio, tmp_path: Path)
         return {offer["name"]: offer for offer in ask(studio, "GET", f"api/boards?file={FILE}")[2]["boards"]}
 
     found = offered()
-    assert [name for name in found if not found[name]["isProject"]] == ["icebreaker", "tangnano9k", "ulx3s"]
+    open_boards = ["crosslink_nx_evn", "gatemate_a1_evb", "icebreaker", "step_mxo2", "tangnano9k", "ulx3s"]
+    assert [name for name in found if not found[name]["isProject"]] == open_boards
     assert found["ulx3s"]["command"] == "firm bitstream tilt.yaml --board ulx3s"
     assert found["ulx3s"]["folder"] == found["quartus"]["folder"] == str(tmp_path / "tilt")
     assert found["quartus"]["command"] == "fusesoc run --setup --target=quartus robot:sys:tilt:0.1.0"
