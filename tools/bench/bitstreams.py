@@ -43,7 +43,6 @@ _BUILDS = (
     ("obstacle_node", "icebreaker_w5500"),
     ("obstacle_node", "ulx3s_w5500"),
     ("quat2euler", "crosslink_nx_evn"),
-    ("quat2euler", "gatemate_a1_evb"),
     ("quat2euler", "ulx3s"),
     ("quat2euler_ethernet", "ecp5_versa"),
 )
