@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from fusesoc_firm.tools.open_flows import OPEN_FLOWS
 from tests.hdl.ghdl import REPOSITORY
 
 _SYSTEM, _TOP = "robot:sys:obstacle", "obstacle_system"
@@ -24,13 +25,20 @@ class Cells:
     is_in_debian: bool = False
 
 
+def _own(flow: str, *options: str) -> str:
+    """Return the command with which our own flow synthesises, with further options."""
+    own = OPEN_FLOWS[flow].own
+    assert own
+    return " ".join([*own.synthesis, *options])
+
+
 FAMILIES = {
     # By Edalize's flow for boards; the options are those for which Yosys has models that Icarus 11 can read.
     "apicula": Cells("synth_gowin -noiopads -noalu", "gowin/cells_sim.v"),
-    "gatemate": Cells("synth_gatemate -luttree -nomx8 -noiopad", "gatemate/cells_sim.v"),
+    "gatemate": Cells(_own("gatemate", "-noiopad"), "gatemate/cells_sim.v"),
     "icestorm": Cells("synth_ice40", "ice40/cells_sim.v", is_in_debian=True),
-    "machxo2": Cells("synth_lattice -family xo2", "lattice/cells_sim_xo2.v"),
-    "nexus": Cells("synth_nexus -noccu2 -noiopad", "lattice/cells_sim_nexus.v"),
+    "machxo2": Cells(_own("machxo2"), "lattice/cells_sim_xo2.v"),
+    "nexus": Cells(_own("nexus", "-noiopad"), "lattice/cells_sim_nexus.v"),
     "trellis": Cells("synth_ecp5", "lattice/cells_sim_ecp5.v"),
 }
 

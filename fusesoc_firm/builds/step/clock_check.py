@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.text.quoting import make_argument
 from fusesoc_firm.tools.open_flows import OPEN_FLOWS, REPORT
 
 # nextpnr rounds a period to picoseconds.
@@ -33,7 +33,7 @@ def checked(flow: type[Any], name: str, clocks: Mapping[str, str]) -> type[Any]:
             bitstream = f"{self.edam['name']}{OPEN_FLOWS[name].bitstream}"
             for command in self.commands.commands:
                 if bitstream in command.targets and any(command.commands):
-                    command.commands.insert(0, [shlex.join(words)])
+                    command.commands.insert(0, [*map(make_argument, words)])
 
     Checked.__name__ = flow.__name__
     return Checked
