@@ -9,6 +9,7 @@ import json
 import math
 import os
 import queue
+import select
 import shutil
 import signal
 import socket
@@ -230,6 +231,15 @@ class NodeProcess:
         """Wait until it ends; its exit status."""
         return self.process.wait()
 
+    def children(self) -> dict[str, int]:
+        """The processes that it started, by their command lines."""
+        lines = {Path(f"/proc/{number}/cmdline"): number for number in self._child_numbers()}
+        return {path.read_bytes().replace(b"\0", b" ").decode(): number for path, number in lines.items()}
+
+    def _child_numbers(self) -> list[int]:
+        path = Path(f"/proc/{self.process.pid}/task")
+        return [int(word) for task in path.iterdir() for word in (task / "children").read_text().split()]
+
     def wait_until_said(self, text: str, times: int = 1) -> None:
         """Wait until it has printed a text so many times."""
         while self.said().count(text) < times:
@@ -243,7 +253,15 @@ class NodeProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self.process.poll() is None:
-            self.process.kill()
+            # Its bridge to ROS would still answer for the next node of the same name.
+            ends = []
+            for number in (self.process.pid, *self._child_numbers()):
+                with suppress(ProcessLookupError):
+                    ends.append(os.pidfd_open(number))
+                    signal.pidfd_send_signal(ends[-1], signal.SIGKILL)
+            for end in ends:
+                select.select([end], [], [])
+                os.close(end)
             self.process.wait()
         self._log.close()
         if error is not None:

@@ -56,12 +56,6 @@ class LiveNode(NodeProcess):
         """Wait until it is a node of ROS, its simulator being built."""
         self.wait_until_said(" is a node of ROS ")
 
-    def children(self) -> dict[str, int]:
-        """The processes that it started, by their command lines."""
-        path = Path(f"/proc/{self.process.pid}/task")
-        numbers = [int(word) for task in path.iterdir() for word in (task / "children").read_text().split()]
-        return {Path(f"/proc/{n}/cmdline").read_bytes().replace(b"\0", b" ").decode(): n for n in numbers}
-
     def kill_child(self, word: str) -> None:
         """Kill what it started with `word` in its command line."""
         (number,) = [number for line, number in self.children().items() if word in line]

@@ -80,7 +80,8 @@ class Planner(Place):
     def recording(self, bag: Path, counts: Mapping[str, int]) -> Iterator[None]:
         """Record the action, the orders and what the hardware tells with ROS 1's own recorder.
 
-        It ends when it has received so many messages of these topics: what is still on its way would be lost.
+        It ends when it has received so many messages of these topics and has nothing left to do: what is still on its
+        way, or in the queue of its callbacks, would be lost.
         """
         topics = ["/order", "/told", *(f"{ACTION}/{end}" for end in ("goal", "cancel", "feedback", "result"))]
         command = ["rosbag", "record", "--tcpnodelay", "-O", str(bag), *topics, "__name:=recorder"]
@@ -90,7 +91,8 @@ class Planner(Place):
                 time.sleep(0.02)
             yield
             (node,) = self._nodes("/recorder")
-            while any(_received(node)[topic] < count for topic, count in counts.items()):
+            number = node.getPid("/test")[2]
+            while any(_received(node)[topic] < count for topic, count in counts.items()) or not _is_asleep(number):
                 time.sleep(0.02)
             # Its script does not take a signal that it has inherited as ignored.
             node.shutdown("/test", "the test has ended")
@@ -115,6 +117,12 @@ def _received(node: Any) -> Counter[str]:
     """The numbers of messages that a node of roscpp has received; it answers without the usual status and text."""
     _, subscriptions = node.getBusStats("/test")
     return Counter({topic: sum(link[2] for link in links) for topic, links in subscriptions})
+
+
+def _is_asleep(number: int) -> bool:
+    """Whether no thread of a process runs, or would."""
+    tasks = Path(f"/proc/{number}/task").iterdir()
+    return {task.joinpath("stat").read_text().rpartition(")")[2].split()[0] for task in tasks} == {"S"}
 
 
 def _links_of(node: Any) -> list[Any] | None:
