@@ -58,37 +58,33 @@ def _bench(arguments: argparse.Namespace) -> None:
 
 
 def _show(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.exploration.fabrics import fabrics
+    from fusesoc_firm.exploration.fabric_map import FabricMap
+    from fusesoc_firm.exploration.fabrics import fabrics, fabrics_data, fabric_of
     from fusesoc_firm.exploration.fabrics_text import fabrics_text, map_picture, map_text
     from fusesoc_firm.exploration.worst_case import worst_times
     from fusesoc_firm.exploration.worst_case_text import worst_times_text
-    from fusesoc_firm.system.hardware.exchange import described
     from fusesoc_firm.system.views.inner_topics import topics_description, ways_of_topics
-    from fusesoc_firm.system.written.specification import WIRED, WIRES
     from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.map, None)
     loaded = load(arguments)
-    exchange = loaded.system.exchange
-    written = str(loaded.specification.project.fabric)
+    drawn = FabricMap(loaded.system.exchange) if loaded.system.exchange else None
     found, times = fabrics(loaded), worst_times(loaded)
     if arguments.map:
-        if not exchange:
+        if not drawn:
             fail("--map draws the routers of an exchange", hint="add 'fabric: crossbar' or another one to 'project'")
-        draw(map_picture(loaded.system.name, exchange), arguments.map, None)
-    chosen = WIRES if written in WIRED or not exchange else written
+        draw(map_picture(loaded.system.name, drawn), arguments.map, None)
     if arguments.json:
-        ways = [item.data() for item in found]
         worst = [item.data() for item in times]
-        print_json({"fabric": chosen, "ways": ways, "worstCase": worst, **topics_description(loaded.system)})
+        print_json({**fabrics_data(loaded, found), "worstCase": worst, **topics_description(loaded.system)})
         return
     for line in ways_of_topics(loaded.system) or ["no topic is within the FPGA"]:
         print(line)
     if len(found) > 1:
         print(f"\nways, estimated for an ECP5, with streams of {loaded.system.width} bits; *: the specification's")
-        print("\n".join(fabrics_text(found, chosen)))
+        print("\n".join(fabrics_text(found, fabric_of(loaded))))
     if loaded.system.inner_topics:
         print("\n".join(worst_times_text(times)))
-    if exchange:
-        print(f"\n{described(exchange)}")
-        print("\n".join(map_text(exchange)))
+    if drawn:
+        print(f"\n{drawn.title}")
+        print("\n".join(map_text(drawn)))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, NamedTuple
 
+from fusesoc_firm.exploration.fabric_map import FabricMap
 from fusesoc_firm.noc.estimate import delay, merge_lut, routers_lut, sender_lut
 from fusesoc_firm.noc.model import Frame, arrivals, merged
 from fusesoc_firm.noc.network import Network, topologies
@@ -15,7 +16,7 @@ from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.exchange import field_bits
 from fusesoc_firm.system.derived.model import DerivedSystem, Exchange, Junction
 from fusesoc_firm.system.system_core import LoadedSystem, with_keys
-from fusesoc_firm.system.written.specification import TOPOLOGIES, WIRES
+from fusesoc_firm.system.written.specification import TOPOLOGIES, WIRED, WIRES
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 # The cycles that the model runs, those of them before messages count, and the seed of random times.
@@ -68,6 +69,19 @@ def fabrics(loaded: LoadedSystem) -> list[Fabric]:
     sensible = {item.kind.replace(" ", "_") for item in topologies(len(exchange.ends))}
     names = [name for name in TOPOLOGIES[1:] if name in sensible or name == loaded.specification.project.fabric]
     return [*found, *(_with(loaded, name) for name in names)]
+
+
+def fabric_of(loaded: LoadedSystem) -> str:
+    """Return the way that the system uses."""
+    written = str(loaded.specification.project.fabric)
+    return WIRES if written in WIRED or not loaded.system.exchange else written
+
+
+def fabrics_data(loaded: LoadedSystem, found: Sequence[Fabric]) -> dict[str, Any]:
+    """Return the system's way, the figures of all ways, and the map of its exchange, if it has one, as plain data."""
+    exchange = loaded.system.exchange
+    drawn = {"map": FabricMap(exchange).data()} if exchange else {}
+    return {"fabric": fabric_of(loaded), "ways": [item.data() for item in found], **drawn}
 
 
 def _with(loaded: LoadedSystem, name: str) -> Fabric:

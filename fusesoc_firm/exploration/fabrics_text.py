@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
+from fusesoc_firm.exploration.fabric_map import FabricMap
 from fusesoc_firm.exploration.fabrics import Fabric, traffic
 from fusesoc_firm.exploration.tables import WIDTH, aligned, cut
-from fusesoc_firm.noc.network import Network
-from fusesoc_firm.system.derived.model import Exchange
-from fusesoc_firm.system.hardware.exchange import described
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.quoting import dot_markup
 
@@ -48,40 +45,25 @@ def traffic_text(found: Sequence[Fabric], chosen: str) -> Iterator[str]:
     yield from aligned(rows, 2)
 
 
-def map_text(exchange: Exchange) -> Iterator[str]:
+def map_text(found: FabricMap) -> Iterator[str]:
     """Yield the lines of a map: the routers with the blocks at them; a grid as a grid."""
-    network = exchange.network
-    if network.topology.columns > 1:
-        yield from _grid(network, _blocks_at(exchange))
+    if found.exchange.network.topology.columns > 1:
+        yield from _grid(found)
         return
     after: dict[int, list[int]] = {}
-    for source, sink in _links(network):
+    for source, sink in found.links:
         after.setdefault(source, []).append(sink)
-    for router, blocks in enumerate(_blocks_at(exchange)):
+    for router, blocks in enumerate(found.blocks):
         ways = f" -> router {', '.join(map(str, after[router]))}" if router in after else ""
         yield cut(f"router {router}: {', '.join(blocks) or '-'}{ways}", WIDTH)
 
 
-def _links(network: Network) -> list[tuple[int, int]]:
-    """Return the links between routers that flows use."""
-    ways = network.ways.values()
-    return sorted({link for way in ways for link in pairwise(way)})
-
-
-def _blocks_at(exchange: Exchange) -> list[list[str]]:
-    """Return the blocks at each router."""
-    found: list[list[str]] = [[] for _ in range(exchange.network.topology.routers)]
-    for end, router in zip(exchange.ends, exchange.network.places, strict=True):
-        found[router].append(end.block)
-    return found
-
-
-def _grid(network: Network, blocks: Sequence[Sequence[str]]) -> Iterator[str]:
+def _grid(found: FabricMap) -> Iterator[str]:
     """Yield the lines of a grid of routers, with a line where a link is used."""
-    columns = network.topology.columns
+    columns, blocks = found.exchange.network.topology.columns, found.blocks
     width = max(3, *(len(name) for names in blocks for name in (*names, "")))
     height = max(1, *(len(names) for names in blocks))
-    links = {frozenset(link) for link in _links(network)}
+    links = {*map(frozenset, found.links)}
     for first in range(0, len(blocks), columns):
         row = range(first, min(first + columns, len(blocks)))
         for line in range(height):
@@ -96,25 +78,25 @@ def _grid(network: Network, blocks: Sequence[Sequence[str]]) -> Iterator[str]:
             yield "  ".join(f"{mark:^{width + 2}}" for mark in marks).rstrip()
 
 
-def map_picture(name: str, exchange: Exchange) -> str:
+def map_picture(name: str, found: FabricMap) -> str:
     """Return the map in Graphviz's language DOT; raise `InputError` if the package graphviz is missing."""
     try:
         import graphviz
     except ModuleNotFoundError:
         fail("pictures require the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
-    network = exchange.network
-    columns = network.topology.columns or network.topology.routers
+    topology = found.exchange.network.topology
+    columns = topology.columns or topology.routers
     text = {"fontname": "sans-serif", "fontsize": "10"}
     graph = graphviz.Digraph(name, node_attr={**text, "shape": "box", "margin": "0.08,0.05"}, edge_attr=text)
-    graph.attr(label=f"{name}: {described(exchange)}", rankdir="TB", **text)
-    for router, blocks in enumerate(_blocks_at(exchange)):
+    graph.attr(label=f"{name}: {found.title}", rankdir="TB", **text)
+    for router, blocks in enumerate(found.blocks):
         lines = [f"router {router}", *blocks]
         graph.node(f"r{router}", f"<{'<br/>'.join(map(dot_markup, lines))}>", style="filled", fillcolor="#eaeef2")
-    for first in range(0, network.topology.routers, columns):
+    for first in range(0, topology.routers, columns):
         with graph.subgraph() as row:
             row.attr(rank="same")
-            for router in range(first, min(first + columns, network.topology.routers)):
+            for router in range(first, min(first + columns, topology.routers)):
                 row.node(f"r{router}")
-    for source, sink in _links(network):
+    for source, sink in found.links:
         graph.edge(f"r{source}", f"r{sink}")
     return str(graph.source)

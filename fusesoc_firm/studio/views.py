@@ -1,4 +1,4 @@
-"""The page's views of an open system on request: bytes of frames, generated VHDL, and schedulers."""
+"""The page's views of an open system on request: bytes of frames, generated VHDL, schedulers, and ways of topics."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from aiohttp import web
 
 from fusesoc_firm.builds.call.why import Reason, names_of, reasons
+from fusesoc_firm.exploration.fabrics import fabrics, fabrics_data
 from fusesoc_firm.scheduling.analysis import choose
 from fusesoc_firm.scheduling.choice import as_data
 from fusesoc_firm.studio.byte_map import byte_map
@@ -17,6 +18,7 @@ from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.derived.timing import channel_of, tasks_of
 from fusesoc_firm.system.system_core import LoadedSystem, artifacts
+from fusesoc_firm.system.views.inner_topics import ways_of_topics
 from fusesoc_firm.text.diagnostics import InputError, SourceRef
 from fusesoc_firm.text.render import Rendering
 
@@ -30,7 +32,12 @@ class Views:
 
     def requests(self) -> Requests:
         """Return the requests."""
-        return {"GET bytes": self._bytes, "GET generated": self._generated, "GET schedulers": self._schedulers}
+        return {
+            "GET bytes": self._bytes,
+            "GET generated": self._generated,
+            "GET schedulers": self._schedulers,
+            "GET fabrics": self._fabrics,
+        }
 
     async def _bytes(self, request: web.Request) -> web.Response:
         """Return the frame's layout of each converter."""
@@ -49,6 +56,11 @@ class Views:
             return in_json(await self._workspace.in_turn(schedulers, loaded))
         except InputError as error:
             return in_json({"missing": str(error)})
+
+    async def _fabrics(self, request: web.Request) -> web.Response:
+        """Return the ways of the topics within the FPGA, what each would cost, and the map of the exchange."""
+        loaded = await self._loaded(request)
+        return in_json(await self._workspace.in_turn(ways, loaded))
 
     async def _loaded(self, request: web.Request) -> LoadedSystem:
         document = self._workspace.document(request.query.get("file", ""))
@@ -85,6 +97,11 @@ def schedulers(loaded: LoadedSystem) -> dict[str, Any]:
         "clock": None if system.clock is None else float(system.clock),
         **choice,
     }
+
+
+def ways(loaded: LoadedSystem) -> dict[str, Any]:
+    """Return the ways of the topics within the FPGA as `firm fabric show` prints them; `topics` are lines of text."""
+    return fabrics_data(loaded, fabrics(loaded)) | {"topics": ways_of_topics(loaded.system)}
 
 
 def _line(reason: Reason) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.exploration.fabric_map import FabricMap
 from fusesoc_firm.exploration.fabrics import Fabric, Traffic, fabrics, traffic
 from fusesoc_firm.exploration.fabrics_text import map_text
 from fusesoc_firm.noc.estimate import delay
@@ -123,11 +124,11 @@ def test_the_map_of_a_grid_and_of_others(tmp_path: Path) -> None:
     crossbar = found(spec(tmp_path, "mesh"))["crossbar"].exchange
     assert mesh is not None
     assert crossbar is not None
-    lines = [*map_text(mesh)]
+    lines = [*map_text(FabricMap(mesh))]
     assert sum(line.count("[") for line in lines) == 6
     assert all(any(block in line for line in lines) for block in ("edges", "regions", "corners", "tracker", "done"))
     assert "--" in lines[0]
-    assert [*map_text(crossbar)] == ["router 0: edges, regions, corners, tracker, done"]
+    assert [*map_text(FabricMap(crossbar))] == ["router 0: edges, regions, corners, tracker, done"]
 
 
 def out(capsys: Captured, *arguments: object) -> str:

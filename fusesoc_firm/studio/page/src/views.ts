@@ -80,6 +80,27 @@ export const bytes = (file: string) => get<{ width: number; blocks: Record<strin
 export const generated = (file: string, name: string) =>
   get<{ names: string[]; name: string; lines: Line[] }>("generated", { file, name });
 export const schedulers = (file: string) => get<Schedulers | { missing: string }>("schedulers", { file });
+/** A way of the topics within the FPGA; see fusesoc_firm/exploration/fabrics.py. */
+export interface Way {
+  fabric: string;
+  lut?: number;
+  ff?: number;
+  routers?: number;
+  hops?: number;
+  cycles?: number;
+  interval?: number;
+  fault?: string;
+}
+
+/** Routers at columns and rows with their blocks, and the links between them. */
+export interface FabricMap {
+  title: string;
+  routers: { x: number; y: number; blocks: string[] }[];
+  links: { from: number; to: number; beats: number }[];
+}
+
+export const fabrics = (file: string) =>
+  get<{ fabric: string; ways: Way[]; map?: FabricMap; topics: string[] }>("fabrics", { file });
 export const timeline = () => get<{ grants: Grant[]; waits: Waits[] }>("timeline");
 export const status = () => get<{ access: string | null; counts: Record<string, number> }>("status");
 export const series = (block: string, field: string) => get<Series>("series", { block, field });
