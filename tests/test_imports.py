@@ -37,8 +37,8 @@ ALLOWED: dict[str, str] = {
     "builds": "converter core fabric message node runs system text tools",
     "ip_xact": "builds core netlist system text tools",
     "api": "accelerator builds frame message node runs system text",
-    "studio": "accelerator builds converter core frame message node runs scheduling system text tools",
-    "exploration": "accelerator compiler frame netlist noc runs studio system text tools",
+    "exploration": "accelerator compiler core frame netlist noc node runs system text tools",
+    "studio": "accelerator builds converter core exploration frame message node runs scheduling system text tools",
     "cli": (
         "accelerator builds converter exploration fabric ip_xact message node runs scheduling studio system text tools"
     ),

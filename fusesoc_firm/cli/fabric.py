@@ -59,7 +59,7 @@ def _bench(arguments: argparse.Namespace) -> None:
 
 def _show(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.exploration.fabric_map import FabricMap
-    from fusesoc_firm.exploration.fabrics import fabrics, fabrics_data, fabric_of
+    from fusesoc_firm.exploration.fabrics import fabric_of, fabrics, fabrics_data
     from fusesoc_firm.exploration.fabrics_text import fabrics_text, map_picture, map_text
     from fusesoc_firm.exploration.worst_case import worst_times
     from fusesoc_firm.exploration.worst_case_text import worst_times_text

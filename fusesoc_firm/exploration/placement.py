@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.compiler.schedule import Schedule
+from fusesoc_firm.exploration.resources import resources_of_netlist, translated, yosys_program
 from fusesoc_firm.netlist.translation import Translation
-from fusesoc_firm.studio.resources import resources_of_netlist, translated, yosys_program
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.hardware.compiled import entity_of
 from fusesoc_firm.text.render import render

@@ -22,7 +22,6 @@ from aiohttp import web
 from fusesoc_firm.builds.setup.bitstream import programs_of, remedy
 from fusesoc_firm.core.core_reader import CoreFile
 from fusesoc_firm.node.transport.built_simulator import project_folder
-from fusesoc_firm.studio.processes import run
 from fusesoc_firm.studio.requests import Requests, body_of, in_json
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.boards.board import Board
@@ -31,6 +30,7 @@ from fusesoc_firm.system.scaffold.board_targets import boards_of, fits
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.programs import missing
+from fusesoc_firm.tools.sessions import run
 
 BITSTREAM, LOAD = "bitstream", "load"
 _RUNNING, _FAILED, _CANCELLED = "running", "failed", "cancelled"

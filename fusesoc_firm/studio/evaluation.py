@@ -8,9 +8,9 @@ from typing import Any
 
 from aiohttp import web
 
+from fusesoc_firm.exploration.resources import resources_of
 from fusesoc_firm.studio.document import Document
 from fusesoc_firm.studio.requests import Requests
-from fusesoc_firm.studio.resources import resources_of
 from fusesoc_firm.studio.workspace import Workspace
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import InputError

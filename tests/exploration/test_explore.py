@@ -16,11 +16,11 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.exploration import placement
 from fusesoc_firm.exploration.accuracy import accuracy, calls_of
 from fusesoc_firm.exploration.points import Point, explored
+from fusesoc_firm.exploration.resources import Tell
 from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.runs.bags.writer import RecordedTopic, write_bag
 from fusesoc_firm.runs.simulation.software_run import system_stimuli
-from fusesoc_firm.studio.resources import Tell
 from fusesoc_firm.system.message_sources import load_beside
 from tests.exploration.projects import loaded, project
 

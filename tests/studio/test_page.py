@@ -17,8 +17,8 @@ import yaml
 from matplotlib import image as pictures
 
 import fusesoc_firm.studio
+from fusesoc_firm.exploration.resources import Tell
 from fusesoc_firm.studio import evaluation
-from fusesoc_firm.studio.resources import Tell
 from tests.studio.browser import PROGRAM, Page, shared_browser
 from tests.studio.played import write_service
 from tests.studio.served import served

@@ -14,9 +14,10 @@ import aiohttp
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.studio import processes, resources
-from fusesoc_firm.studio.resources import blocks_of, cells_of, slowest
+from fusesoc_firm.exploration import resources
+from fusesoc_firm.exploration.resources import blocks_of, cells_of, slowest
 from fusesoc_firm.studio.server import Studio
+from fusesoc_firm.tools import sessions
 from fusesoc_firm.tools.programs import find
 from tests.studio.served import served
 
@@ -157,7 +158,7 @@ def test_a_cancelled_program_ends_at_any_moment(tmp_path: Path) -> None:
 
     async def cancelled(last: str) -> None:
         command = ["sh", "-c", f"sleep 1000 & echo $! >> {noted}; {last}"]
-        running = asyncio.create_task(processes.run(command, tmp_path, print))
+        running = asyncio.create_task(sessions.run(command, tmp_path, print))
         await asyncio.sleep(source.random() / 50)
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)

@@ -2,7 +2,7 @@
 
 import { address } from "./api";
 
-/** What a block takes; see fusesoc_firm/studio/resources.py. */
+/** What a block takes; see fusesoc_firm/exploration/resources.py. */
 export interface Resources {
   name: string;
   lut: number;

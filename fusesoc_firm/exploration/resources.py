@@ -24,7 +24,6 @@ from typing import Any
 
 from fusesoc_firm.core.core_reader import CoreFile
 from fusesoc_firm.node.transport.built_simulator import fusesoc_run, project_folder
-from fusesoc_firm.studio.processes import run
 from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.files import write_whole
@@ -32,6 +31,7 @@ from fusesoc_firm.text.yaml_text import data_in
 from fusesoc_firm.tools import own_code
 from fusesoc_firm.tools.digests import default_root
 from fusesoc_firm.tools.programs import facts_of, find, missing, ways
+from fusesoc_firm.tools.sessions import run
 
 DEVICE = "LFE5U-85F, speed grade 8"
 STEPS = ("netlist", "cells", "places")

@@ -1,4 +1,4 @@
-"""A program that the page has started: its lines as they appear, and its end with all that it has started."""
+"""A program as the leader of a session: its lines as they appear, and its end with all that it has started."""
 
 from __future__ import annotations
 
