@@ -21,6 +21,7 @@ from fusesoc_firm.cli.here import core_named
 from fusesoc_firm.cli.progress import Progress
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import shown
+from fusesoc_firm.tools.simulators import SIMULATORS
 
 if TYPE_CHECKING:
     from fusesoc_firm.builds.setup.simulation import Report, Simulation
@@ -48,7 +49,7 @@ def add_sim(commands: Any) -> None:
         nargs="?",
         help="a specification with a core beside it, or a core's name in FuseSoC (default: the core in this folder)",
     )
-    sim.add_argument("--tool", choices=("ghdl", "icarus", "verilator"), help="the simulator (default: the core's)")
+    sim.add_argument("--tool", choices=[*SIMULATORS], help="the simulator (default: the core's)")
     sim.add_argument("--seed", type=natural, metavar="N", help="the seed of the random stalls (default: the core's)")
     sim.add_argument("--waves", action="store_true", help="write a waveform file")
     sim.add_argument(
@@ -111,7 +112,6 @@ def _sent(work_root: Path) -> int:
 
 def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
     from fusesoc_firm.runs.simulation.answers import read_answers, software_answers
-    from fusesoc_firm.tools.simulators import SIMULATORS
 
     answers: Sequence[Answer] = []
     software: Mapping[int, Sequence[Answer]] = {}

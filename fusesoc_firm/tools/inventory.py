@@ -41,7 +41,7 @@ _PROGRAMS: Mapping[str, _Wanted] = {
     "ghdl": _Wanted("simulates VHDL, and makes netlists of it for all other tools", (2,)),
     "iverilog": _Wanted("simulates netlists and Verilog (targets sim_icarus)", (11,), "-V"),
     "verilator": _Wanted("simulates fast (targets sim_verilator), and lints", (5, 6)),
-    "nvc": _Wanted("simulates VHDL in benches of VUnit; FuseSoC's flows have no nvc"),
+    "nvc": _Wanted("simulates VHDL (targets sim_nvc), and benches of VUnit", (1, 16)),
     "yosys": _Wanted("counts cells, and makes bitstreams", (0, 23), "-V"),
     "nextpnr-ice40": _Wanted("places and routes for iCE40 (board icebreaker), with icepack"),
     "nextpnr-ecp5": _Wanted("places and routes for ECP5 (board ulx3s), with ecppack"),

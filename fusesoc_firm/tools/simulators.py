@@ -13,14 +13,15 @@ from dataclasses import dataclass, field
 class Live:
     """The build and the start of a simulator that another program starts (docs/reference/transports.md).
 
-    `parameter` precedes `NAME=value` on the simulator's command line. If FuseSoC's build does not create the simulator,
-    the makefile's target `made_by` does. The start command is the line of the makefile's target `run` that begins with
-    `started_by` or, without such a line, the program `V<toplevel>`.
+    `parameter` precedes `NAME=value` on the simulator's command line, at its end or before the word `before`. If
+    FuseSoC's build does not create the simulator, the makefile's target `made_by` does. The start command is the line
+    of the makefile's target `run` that begins with `started_by` or, without such a line, the program `V<toplevel>`.
     """
 
     parameter: str
     made_by: str = ""
     started_by: str = ""
+    before: str = ""
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,14 @@ class Simulator:
 
     A simulator that does not read VHDL reads a Verilog netlist from GHDL. `options` are the options of the simulator's
     flow in Edalize, and `system_verilog` are additional options for SystemVerilog. C++ functions require GHDL's native
-    interface (VHPIDIRECT). `waves` is the name of the waveform file, for which a build needs FuseSoC's `wave_options`.
+    interface (VHPIDIRECT). With `runs_cocotb`, Edalize runs benches of cocotb in it, without a C++ compiler. `waves` is
+    the name of the waveform file, for which a build needs FuseSoC's `wave_options`.
     """
 
     title: str
     reads_vhdl: bool = False
     calls_functions: bool = False
+    runs_cocotb: bool = False
     programs: tuple[str, ...] = ()
     options: Mapping[str, str | list[str]] = field(default_factory=dict)
     system_verilog: Mapping[str, str | list[str]] = field(default_factory=dict)
@@ -48,6 +51,7 @@ SIMULATORS: dict[str, Simulator] = {
         "GHDL",
         reads_vhdl=True,
         calls_functions=True,
+        runs_cocotb=True,
         programs=("ghdl",),
         options={"sim_options": ["--ieee-asserts=disable-at-0"]},
         # FuseSoC does not build anything before the run. The makefile's line contains the options of the analysis.
@@ -56,6 +60,7 @@ SIMULATORS: dict[str, Simulator] = {
     ),
     "icarus": Simulator(
         "Icarus Verilog",
+        runs_cocotb=True,
         programs=("iverilog",),
         system_verilog={"iverilog_options": ["-g2012"]},
         # Edalize starts the simulator with `-fst`.
@@ -71,6 +76,14 @@ SIMULATORS: dict[str, Simulator] = {
         },
         live=Live("+"),
         wave_options=("--verilator_options=--trace",),
+    ),
+    "nvc": Simulator(
+        "nvc",
+        reads_vhdl=True,
+        programs=("nvc",),
+        options={"nvc_options": ["--ieee-warnings=off-at-0"]},
+        live=Live("-g", started_by="nvc ", before="-r"),
+        waves="waves.fst",
     ),
 }
 """The simulators by Edalize's names; the first suitable simulator is the default."""

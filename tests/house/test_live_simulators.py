@@ -95,9 +95,7 @@ def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], specs: 
     system, folder = recorded
     stimuli, received = frames_of(folder / "stimulus.txt"), frames_of(folder / "received.txt")
     ends = []
-    for tool in fitting(is_live=True):
-        if shutil.which(tool) is None:
-            pytest.skip(f"{tool} is not installed")
+    for tool in filter(shutil.which, fitting(is_live=True)):
         built = build_simulator(specs / system / f"{system}.yaml", tool, build_root=build_root.parent / "simulators")
         found, last = answers(built, stimuli, SYSTEMS[system], len(received))
         assert by_id(found) == by_id(received)
@@ -270,9 +268,7 @@ def test_waits_are_those_of_the_waves(system: str, specs: Path, tmp_path: Path, 
     loaded = load_beside(spec)
     ids = {item.block: item.id for item in loaded.system.subscribers}
     frames = [pack_frame(ids[item.subscriber.block], item.payload) for item in stimuli_of(spec, loaded)[:12]]
-    for tool in fitting(is_live=True):
-        if shutil.which(tool) is None:
-            pytest.skip(f"{tool} is not installed")
+    for tool in filter(shutil.which, fitting(is_live=True)):
         built = build_simulator(spec, tool, build_root=build_root.parent / "simulators")
         command = built.command(seed=3, stall_percent=STALL_PERCENT)
         command += [f"--vcd={tmp_path / 'waves.vcd'}"] * (tool == "ghdl")

@@ -16,8 +16,14 @@ from tests.house.test_main_job import ROOT, run
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, ("iverilog", "verilator"))), reason="Icarus Verilog or Verilator is not installed"
 )
-TARGETS = ("sim", "sim_icarus", "sim_verilator")
-PROGRAMS = {"sim": {"ghdl"}, "sim_icarus": {"ghdl", "iverilog", "vvp"}, "sim_verilator": {"ghdl", "verilator", "g++"}}
+# No package of Debian has nvc.
+TARGETS = ("sim", *["sim_nvc"] * bool(shutil.which("nvc", path="/usr/bin")), "sim_icarus", "sim_verilator")
+PROGRAMS = {
+    "sim": {"ghdl"},
+    "sim_nvc": {"nvc"},
+    "sim_icarus": {"ghdl", "iverilog", "vvp"},
+    "sim_verilator": {"ghdl", "verilator", "g++"},
+}
 # With their numbers of messages: variable size and bursts, pins with motors, accelerators in Verilog.
 SYSTEMS = {"quat2euler": 100, "image_pipeline": 7, "multi_type": 19, "mobile_robot": 14, "multi_type_verilog": 19}
 # Without multi_type: of its hardware, all but two accelerators is that of multi_type_verilog.
@@ -54,8 +60,8 @@ def of_a_third(project: Path) -> Path:
 def test_all_simulators_receive_the_same(system: str, tmp_path: Path) -> None:
     project = of_a_third(tmp_path / "project") if system == "mobile_robot" else ROOT
     reports, received = [], []
-    # GHDL does not read Verilog: there, `sim` is `sim_icarus`.
-    for target in TARGETS[system.endswith("_verilog") :]:
+    # GHDL and nvc do not read Verilog: there, `sim` is `sim_icarus`.
+    for target in TARGETS[-2:] if system.endswith("_verilog") else TARGETS:
         done = run(system, tmp_path / "build", *OPTIONS.get(target, ()), project=project, target=target)
         print(done.stdout)
         assert done.returncode == 0

@@ -110,6 +110,15 @@ def test_cores(firm: Library, tmp_path: Path) -> None:
     replace(firm, directory=tmp_path).analyse([SIMULATED_SYNC], *STRICT)
 
 
+@pytest.mark.skipif(shutil.which("nvc") is None, reason="nvc is not installed")
+@pytest.mark.parametrize("revision", ["1993", "2008"])
+def test_cores_in_nvc(revision: str, tmp_path: Path) -> None:
+    files = in_order(set(CORES.rglob("*.vhd")) - {SIMULATED_SYNC})
+    command = ["nvc", f"--std={revision}", f"--work=firm:{tmp_path / 'firm'}", "-a", *map(str, files)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
 def test_a_port_with_bounds_other_than_its_actual_is_found(firm: Library, tmp_path: Path) -> None:
     """By GHDL 3 and later, and for constant bounds only in the elaboration."""
     path = tmp_path / "bounds.vhd"

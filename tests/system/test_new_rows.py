@@ -73,8 +73,11 @@ def test_rows_and_files_are_all_that_it_takes(project: Path) -> None:
     firm(project, "system", "core", "robot/quat2euler.yaml")
     after = yaml.safe_load(core.read_text())["targets"]
     assert after.keys() - before.keys() == {*NEW}
-    assert after["sim_xcelium"] == after["sim"] | {"generate": ["system", {"simulation": {"simulator": "xcelium"}}]}
-    assert "{ghdl,verilator,xcelium}" in firm(project, "simulator", "--help")
+    assert after["sim_xcelium"] == after["sim"] | {
+        "flags": {"firm_launcher": True, "vhdl_host": True},
+        "generate": ["system", {"simulation": {"simulator": "xcelium"}}],
+    }
+    assert "{ghdl,verilator,nvc,xcelium}" in firm(project, "simulator", "--help")
     firm(project, "build", "quat2euler", "--setup", "--target", *NEW)
     made = {path.parent.name: path for path in project.glob("build/*/*/*.eda.yml")}
     files = {

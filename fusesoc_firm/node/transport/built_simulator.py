@@ -62,8 +62,10 @@ class BuiltSimulator:
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
         """Return the command to run in `folder`; `seed` selects the `stall_percent` of cycles with stalls."""
-        mark = _live(self.tool).parameter
-        return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
+        live = _live(self.tool)
+        place = self.words.index(live.before) if live.before else len(self.words)
+        parameters = [f"{live.parameter}SEED={seed}", f"{live.parameter}STALL_PERCENT={stall_percent}"]
+        return [*self.words[:place], *parameters, *self.words[place:]]
 
     def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
         """Write a program that starts the simulator from any folder, and return its path."""

@@ -122,10 +122,8 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
 
 
 def _bench_targets(system: DerivedSystem, bench: str) -> str:
-    """Return the targets of a bench in cocotb, of the simulators that cocotb drives without a C++ compiler."""
-    known = {
-        name: item for name, item in fitting(has_verilog=_has_verilog(system)).items() if "g++" not in item.programs
-    }
+    """Return the targets of a bench in cocotb."""
+    known = {name: item for name, item in fitting(has_verilog=_has_verilog(system)).items() if item.runs_cocotb}
     module = PurePosixPath(bench).stem
     flows = {name: simulator_flow(name, system.entity, is_system_verilog=True) for name in known}
     targets = [
@@ -276,8 +274,10 @@ def _simulation(system: DerivedSystem, kind: str, description: str, flag: str, r
         parameters |= {"simulator": name} if name != default else {}
         words = _generate(_call(_SYSTEM, replaced), _call(_SIMULATION, {**parameters, **replaced}))
         toplevel = f"{system.entity}_{kind if is_live else 'tb'}"
-        flags = "" if simulator.reads_vhdl else flag
-        targets.append(_Target(f"{kind}_{name}" if targets else kind, words, toplevel, flags))
+        own = flag.replace("verilog", "vhdl") if simulator.reads_vhdl else flag
+        # A target with the name of its kind needs no flag for the host in VHDL.
+        own = "" if simulator.reads_vhdl and not targets else own
+        targets.append(_Target(f"{kind}_{name}" if targets else kind, words, toplevel, own))
     first = next(iter(known))
     return _Kind(kind, description, targets, "" if first == default else f"{kind}_{first}")
 

@@ -316,12 +316,13 @@ def test_a_program_that_is_missing_is_named_with_its_package(
     far = GENERATORS["far"].programs
     found = {
         simulator: far(Request("far", "a:b:c:1", tmp_path, {"product": "simulation", "simulator": simulator}))
-        for simulator in ("ghdl", "icarus", "verilator")
+        for simulator in ("ghdl", "icarus", "verilator", "nvc")
     }
     assert found == {
         "ghdl": ("ghdl",),
         "icarus": ("ghdl", "iverilog"),
         "verilator": ("ghdl", "verilator", "g++", "make"),
+        "nvc": ("nvc",),
     }
     assert far(Request("far", "a:b:c:1", tmp_path, {"product": "system", "simulator": "icarus"})) == []
     bench.programs = ["iverilog"]

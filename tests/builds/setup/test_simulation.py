@@ -11,6 +11,7 @@ from fusesoc_firm.builds.setup.simulation import Message, Report, Wishes, simula
 from fusesoc_firm.cli import main
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.library_path import demos_root
+from fusesoc_firm.tools.programs import missing, simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS
 
 Captured = pytest.CaptureFixture[str]
@@ -80,7 +81,11 @@ def test_the_libraries_are_found(elsewhere: Path) -> None:
     assert (elsewhere / "build" / "FUSESOC_IGNORE").exists()
     verilog = simulation("robot:sys:quat2euler", folder, Wishes("icarus", 7, options="--STALL_PERCENT=0"))
     assert (verilog.build.target, verilog.options) == ("sim_icarus", ("--SEED=7", "--STALL_PERCENT=0"))
-    with_waves = {tool: simulation("robot:sys:quat2euler", folder, Wishes(tool, has_waves=True)) for tool in SIMULATORS}
+    with_waves = {
+        tool: simulation("robot:sys:quat2euler", folder, Wishes(tool, has_waves=True))
+        for tool in SIMULATORS
+        if not missing(simulation_programs(tool))
+    }
     assert with_waves["icarus"].options == ("--WAVES=waves.fst",)
     assert with_waves["verilator"].options == ("--WAVES=waves.vcd", "--verilator_options=--trace")
     with pytest.raises(InputError, match="unknown core 'robot:sys:nothing'"):
