@@ -1,1 +1,1 @@
-"""A core's target as an IP-XACT component, for block designs."""
+"""A component as IP-XACT, for block designs."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -12,13 +11,12 @@ from systemrdl.compiler import RDLCompiler
 from systemrdl.node import RegNode
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.cli.here import core_named
-from fusesoc_firm.ip_xact.design import Design, plan_target
-from fusesoc_firm.ip_xact.package import package, write_package
+from fusesoc_firm.component.design import Design
+from fusesoc_firm.component.package import package
+from fusesoc_firm.ip_xact.package import write_package
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import status_text
-from fusesoc_firm.tools.programs import find
-from fusesoc_firm.tools.yosys import Yosys
+from tests.component.designs import alone, designed, netlist_ports, write_converter, write_system, write_verilog
 from tests.hdl.ghdl import REPOSITORY
 from tests.ip_xact.component_file import YEARS, ComponentFile, read_component
 
@@ -46,38 +44,11 @@ MESSAGES = (
     "sensor_msgs/Temperature",
 )
 WIDTHS = (8, 32)
-DIRECTIONS = {"input": "in", "output": "out", "inout": "inout"}
-CORE = """\
-CAPI=2:
-name: me:robots:{name}:1.0
-description: A converter
-filesets:
-  base: {{depend: ["robot:firm:generators"]}}
-generate:
-  converter:
-    generator: firm
-    parameters: {{message: {message}, ros: 2, width: {width}}}
-    position: prepend
-targets:
-  default: {{filesets: [base], generate: [converter], toplevel: {top}}}
-  none: {{filesets: [base], generate: [converter]}}
-"""
 
 
 @pytest.fixture(autouse=True)
 def _place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty current folder, from which FuseSoC knows no cores."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("HOME", "XDG_CONFIG_HOME"):
-        monkeypatch.setenv(name, str(tmp_path))
-    monkeypatch.setenv("FUSESOC_CORES", "")
-
-
-def designed(core: str) -> Design:
-    """Let FuseSoC set up the default target of a core."""
-    target = plan_target(*core_named(core), "default")
-    assert target.set_up(lambda _: None) == 0, target.build.log.read_text(encoding="utf-8")
-    return target.read()
+    alone(tmp_path, monkeypatch)
 
 
 def packaged(design: Design, folder: str, view: str = "sources", year: int = 2009) -> ComponentFile:
@@ -91,16 +62,10 @@ def run(core: str, folder: str, *words: str) -> ComponentFile:
     return read_component(Path(folder))
 
 
-def yosys_ports(folder: str, component: ComponentFile, tmp_path: Path) -> dict[str, tuple[str, int]]:
+def ports_of(folder: str, component: ComponentFile, tmp_path: Path) -> dict[str, tuple[str, int]]:
     """The ports of the top as Yosys has them after elaborating all Verilog of a component."""
-    program = find("yosys")
-    assert program
-    yosys = Yosys(program, tmp_path)
     paths = [Path(folder, name) for name in component.files if name.endswith(".v")]
-    top = component.vlnv[2]
-    modules = yosys.modules(f"{yosys.reading(paths)}; hierarchy -check -top {top}; proc")
-    ports = modules[top]["ports"]
-    return {name: (DIRECTIONS[port["direction"]], len(port["bits"])) for name, port in ports.items()}
+    return netlist_ports(component.vlnv[2], paths, tmp_path)
 
 
 def vectors_in_source(folder: str, component: ComponentFile) -> dict[str, bool]:
@@ -118,7 +83,7 @@ def vectors_in_source(folder: str, component: ComponentFile) -> dict[str, bool]:
 def check_both_views(design: Design, tmp_path: Path) -> ComponentFile:
     """Package a target's sources and its netlist; return the former. The ports are those of sources and netlist."""
     sources, netlist = packaged(design, "sources"), packaged(design, "netlist", "netlist")
-    assert netlist.widths == yosys_ports("netlist", netlist, tmp_path)
+    assert netlist.widths == ports_of("netlist", netlist, tmp_path)
     assert sources.widths == netlist.widths
     assert {name: bool(bounds) for name, (_, bounds) in sources.ports.items()} == vectors_in_source("sources", sources)
     assert all((bounds is None) == (netlist.widths[name][1] == 1) for name, (_, bounds) in netlist.ports.items())
@@ -182,30 +147,10 @@ def rdl_resets(registers: list[RegNode]) -> dict[int, dict[str, object]]:
     }
 
 
-def write_system(folder: Path) -> Path:
-    """A system with two clocks, whose status has an AXI4-Lite interface."""
-    shutil.copytree(REPOSITORY / "specs" / "obstacle", folder, ignore=shutil.ignore_patterns("*_node*"))
-    core, spec = folder / "obstacle.core", folder / "obstacle.yaml"
-    core.write_text(
-        core.read_text(encoding="utf-8").replace("robot:sys:obstacle:", "me:robots:obstacle:"), encoding="utf-8"
-    )
-    project = "{name: obstacle, status: axi_lite, clock: 100 MHz, clocks: [{name: slow, frequency: 25 MHz}]}"
-    text = spec.read_text(encoding="utf-8").replace("{name: obstacle}", project)
-    spec.write_text(text.replace("type: obstacle,", "type: obstacle, clock: slow,"), encoding="utf-8")
-    return spec
-
-
-def write_converter(folder: Path, message: str, *, is_subscriber: bool, width: int = 8) -> str:
-    name = message.replace("/", "_").lower()
-    top = f"axis_to_{name}" if is_subscriber else f"{name}_to_axis"
-    path = folder / f"{top}_{width}" / "converter.core"
-    path.parent.mkdir()
-    path.write_text(CORE.format(name=f"{top}_{width}", message=message, width=width, top=top), encoding="utf-8")
-    return str(path)
-
-
 def test_a_system(tmp_path: Path) -> None:
-    spec = write_system(tmp_path / "robot")
+    project = "{name: obstacle, status: axi_lite, clock: 100 MHz, clocks: [{name: slow, frequency: 25 MHz}]}"
+    changes = {"{name: obstacle}": project, "type: obstacle,": "type: obstacle, clock: slow,"}
+    spec = write_system(tmp_path / "robot", "obstacle", changes)
     sources = check_both_views(designed(str(spec)), tmp_path)
     assert {name: (bus, is_initiator) for name, (bus, is_initiator, _) in sources.interfaces.items()} == {
         "s_axis": ("interface:axis", False),
@@ -258,34 +203,6 @@ def test_converters(tmp_path: Path, message: str, is_subscriber: bool) -> None:
     sources = check_both_views(designed(core), tmp_path)
     stream = "s_axis" if is_subscriber else "m_axis"
     assert sources.parameters(stream)["TDATA_NUM_BYTES"] == str(width // 8)
-
-
-VERILOG_CORE = """\
-CAPI=2:
-name: me:robots:filter:2.1.4
-filesets:
-  rtl: {files: [filter.v: {file_type: verilogSource}, sizes.vh: {file_type: verilogSource, is_include_file: true},
-    pins.xdc: {file_type: xdc}, notes.txt: {file_type: user}, rom.mem: {file_type: user}]}
-parameters:
-  WIDTH: {datatype: int, default: 24, paramtype: vlogparam}
-targets:
-  default: {filesets: [rtl], toplevel: filter, parameters: [WIDTH]}
-  lint: {filesets: [rtl], toplevel: filter, flow: lint, flow_options: {tool: verilator}}
-"""
-VERILOG = """\
-module filter #(parameter WIDTH = 8) (
-`include "sizes.vh"
-  input aclk, input aresetn, input [WIDTH-1:0] s_axis_tdata, input s_axis_tvalid
-);
-endmodule
-"""
-
-
-def write_verilog(folder: Path) -> str:
-    files = {"filter.core": VERILOG_CORE, "filter.v": VERILOG, "sizes.vh": "input [3:0] level,\n", "rom.mem": "00\n"}
-    for name in (*files, "pins.xdc", "notes.txt"):
-        (folder / name).write_text(files.get(name, ""), encoding="utf-8")
-    return "filter.core"
 
 
 def test_a_core_in_verilog(tmp_path: Path, capsys: Captured) -> None:
@@ -360,7 +277,7 @@ def test_a_record_and_both_languages(tmp_path: Path, capsys: Captured) -> None:
     netlist = run("filter.core", "netlist", "--view", "netlist")
     wires = {"Clk": ("in", 1), "Data": ("in", 4), "Both_a": ("in", 1), "Both_b": ("in", 1), "Q": ("out", 1)}
     assert netlist.vlnv == ["local", "user", "Filter", "1.0"]
-    assert netlist.widths == wires == yosys_ports("netlist", netlist, tmp_path)
+    assert netlist.widths == wires == ports_of("netlist", netlist, tmp_path)
     assert netlist.defaults == {"Data": 1}
     mixed = run("filter.core", "mixed", "--target", "mixed")
     assert [Path(name).name for name in mixed.files] == ["sizes.vhd", "Filter.vhd", "top.v"]

@@ -8,9 +8,10 @@ from pathlib import Path, PurePosixPath
 import pytest
 from lxml import etree
 
-from fusesoc_firm.ip_xact.interfaces import infer
-from fusesoc_firm.ip_xact.model import Component, Direction, Generic, Port, SourceFile
-from fusesoc_firm.ip_xact.package import Package, write_package
+from fusesoc_firm.component.interfaces import infer
+from fusesoc_firm.component.model import Component, Direction, Generic, Port, SourceFile
+from fusesoc_firm.component.package import Package
+from fusesoc_firm.ip_xact.package import write_package
 from fusesoc_firm.ip_xact.writer import STANDARDS, write_component
 from tests.ip_xact.component_file import YEARS, ComponentFile, read_component
 

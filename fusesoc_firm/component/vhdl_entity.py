@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.ip_xact.model import Direction, Generic, Port
+from fusesoc_firm.component.model import Direction, Generic, Port
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.programs import find, ways
 
-_ARCHITECTURE = "firm_ip_xact"
+_ARCHITECTURE = "firm_empty"
 _GENERICS = re.compile(r"^  generic \(\n(.*?)^  \);", re.MULTILINE | re.DOTALL)
 _PORTS = re.compile(r"^  port \(\n(.*?)^  \);", re.MULTILINE | re.DOTALL)
 _END = re.compile(r"^end entity;", re.MULTILINE)

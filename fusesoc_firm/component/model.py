@@ -1,4 +1,4 @@
-"""A component of IP-XACT as plain data, the same for all versions of the standard."""
+"""A component as plain data: ports, bus interfaces, files and generics."""
 
 from __future__ import annotations
 

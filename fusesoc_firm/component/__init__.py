@@ -1,0 +1,1 @@
+"""A core's target as a component: its ports, interfaces and files."""
