@@ -37,12 +37,13 @@ ALLOWED: dict[str, str] = {
     "builds": "converter core fabric message node runs system text tools",
     "component": "builds core netlist system text tools",
     "ip_xact": "component system text",
+    "wrapper": "component text",
     "api": "accelerator builds frame message node runs system text",
     "exploration": "accelerator compiler core frame netlist noc node runs system text tools",
     "studio": "accelerator builds converter core exploration frame message node runs scheduling system text tools",
     "cli": (
         "accelerator builds component converter exploration fabric ip_xact message node runs scheduling studio system "
-        "text tools"
+        "text tools wrapper"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

@@ -46,6 +46,7 @@ _MODULES = {
     "status": "status",
     "registers": "status",
     "ip-xact": "ip_xact",
+    "wrap": "wrap",
     "why": "why",
     "graph": "project",
     "affected": "project",
