@@ -6,12 +6,12 @@ from fusesoc_firm.node.transport.transport import Burst
 
 # The reserved id, and a length that no frame has.
 _BEGINNING = b"\xff" * 5
-_BYTES = 7
+RECORD_BYTES = 7
 
 
 def aborted_id(burst: bytes | bytearray) -> int | None:
     """Return the id of the aborted frame if the burst is a record, or None."""
-    return burst[5] if len(burst) == _BYTES and burst[:5] == _BEGINNING else None
+    return burst[5] if len(burst) == RECORD_BYTES and burst[:5] == _BEGINNING else None
 
 
 def burst_of(data: bytes) -> Burst:

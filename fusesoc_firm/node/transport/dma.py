@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from fusesoc_firm.node.transport.abort_record import burst_of
-from fusesoc_firm.node.transport.dma_device import DMA_ALIGNMENT, DmaDevice
+from fusesoc_firm.node.transport.dma_device import DMA_ALIGNMENT, DmaDevice, Registers
 from fusesoc_firm.node.transport.transport import Burst, Closing, TransportError
 
 # The addresses of the first registers of the channels to and from the system; other registers are at offsets from them.
@@ -173,6 +173,14 @@ class DmaTransport(Closing):
         """Return False, because the number of buffers that a frame needs is unknown."""
         return False
 
+    def has_room(self, size: int) -> bool:
+        """Return whether free buffers hold a frame of this size in bytes, or all buffers are free.
+
+        May raise `TransportError`.
+        """
+        self._take_back()
+        return not self._handed_over or size <= (self._buffers.send - self._handed_over) * self._to_system.size
+
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst, as `Transport.receive` does."""
         end = None if timeout is None else time.monotonic() + timeout
@@ -241,24 +249,26 @@ class DmaTransport(Closing):
         return lambda: not self._device.read(channel + STATUS) & Status.HALTED
 
     def _reset(self) -> bool:
-        """Reset both channels with a single reset; return whether the reset has finished."""
-        self._device.write(TO_SYSTEM + CONTROL, Control.RESET)
-        return _soon(lambda: not self._device.read(TO_SYSTEM + CONTROL) & Control.RESET)
+        return has_reset(self._device)
 
     def _wait_for_room(self) -> None:
         pause = _SHORTEST_PAUSE
         while True:
-            if self._closing.is_set():
-                raise TransportError("the transport is closed")
-            self._check(TO_SYSTEM)
-            while self._handed_over and self._to_system.done(self._first_sent) is not None:
-                self._first_sent = self._to_system.next(self._first_sent)
-                self._handed_over -= 1
+            self._take_back()
             if self._handed_over < self._buffers.send:
                 return
             # The only interrupt of UIO belongs to the receiver.
             time.sleep(pause)
             pause = min(2 * pause, _LONGEST_PAUSE)
+
+    def _take_back(self) -> None:
+        """Take back the buffers that the engine has sent."""
+        if self._closing.is_set():
+            raise TransportError("the transport is closed")
+        self._check(TO_SYSTEM)
+        while self._handed_over and self._to_system.done(self._first_sent) is not None:
+            self._first_sent = self._to_system.next(self._first_sent)
+            self._handed_over -= 1
 
     def _take(self, status: int) -> bool:
         """Append the content of a buffer; return whether the burst is complete."""
@@ -281,6 +291,13 @@ class DmaTransport(Closing):
             found = ["the channel has halted"]
         if found and not self._closing.is_set():
             raise TransportError(f"the DMA engine's {_NAMES[channel]}: {', '.join(found)}")
+
+
+def has_reset(registers: Registers) -> bool:
+    """Reset both channels of an engine with a single reset; return whether the reset has finished."""
+    # PYNQ's registers take no subclass of int.
+    registers.write(TO_SYSTEM + CONTROL, int(Control.RESET))
+    return _soon(lambda: not registers.read(TO_SYSTEM + CONTROL) & Control.RESET)
 
 
 def _soon(condition: Callable[[], bool]) -> bool:

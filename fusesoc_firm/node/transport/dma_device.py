@@ -19,7 +19,7 @@ DMA_ALIGNMENT = 64
 # Bytes.
 DMA_REACH = 2**32
 _WORD_BYTES = 4
-_POLL_SECONDS = 50e-6
+POLL_SECONDS = 50e-6
 # The mode of u-dma-buf that is neither cached nor mapped as device memory; device memory allows only aligned accesses.
 _WRITE_COMBINE = "2"
 
@@ -90,10 +90,7 @@ class LinuxDmaDevice:
             # The path that older releases of u-dma-buf use.
             about = root / "sys/class/udmabuf" / buffer
         self._address, size = number_in(about / "phys_addr"), number_in(about / "size")
-        if self._address + size > DMA_REACH:
-            raise TransportError(f"{buffer} ends beyond the 4 GiB that the DMA engine reaches")
-        if self._address % DMA_ALIGNMENT:
-            raise TransportError(f"{buffer} begins at {self._address:#x}, which is not a multiple of {DMA_ALIGNMENT}")
+        check_place(buffer, self._address, size)
         maps = root / "sys/class/uio" / Path(uio).name / "maps/map0"
         device = root / uio.lstrip("/")
         try:
@@ -130,7 +127,7 @@ class LinuxDmaDevice:
     def wait(self, timeout: float | None) -> None:
         """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
         if not self._has_interrupt:
-            time.sleep(_POLL_SECONDS)
+            time.sleep(POLL_SECONDS)
             return
         try:
             # The kernel disables the interrupt when it occurs.
@@ -143,6 +140,14 @@ class LinuxDmaDevice:
     def end(self) -> None:
         """Wake all threads that wait, now and later."""
         os.close(self._woken)
+
+
+def check_place(buffer: str, address: int, size: int) -> None:
+    """Raise `TransportError` unless the engine can use the memory of this name."""
+    if address + size > DMA_REACH:
+        raise TransportError(f"{buffer} ends beyond the 4 GiB that the DMA engine reaches")
+    if address % DMA_ALIGNMENT:
+        raise TransportError(f"{buffer} begins at {address:#x}, which is not a multiple of {DMA_ALIGNMENT}")
 
 
 def number_in(path: Path) -> int:

@@ -65,9 +65,7 @@ def bring_up_files(
     If `is_reserved`, Linux reserves the memory when it boots; otherwise the memory comes from Linux's contiguous
     memory (CMA). Raise `InputError` if the board has no processor, or if the system does not fit on it.
     """
-    if not board.processor:
-        legal = ", ".join(_LINUX)
-        fail(f"board '{board.name}' has no processor that runs Linux", hint=f"legal: a board with processor {legal}")
+    check_runs_linux(board)
     if not 1 <= mebibytes <= _MOST_MEBIBYTES:
         fail(f"the shared memory has {mebibytes} MiB; legal: 1 to {_MOST_MEBIBYTES}")
     check_fits(system, board)
@@ -79,6 +77,13 @@ def bring_up_files(
         f"{design}.sh": render("board/load.sh", context),
     }
     return {**files, f"{design}_memory.dtso": render("board/memory.dtso", context)} if is_reserved else files
+
+
+def check_runs_linux(board: Board) -> None:
+    """Raise `InputError` if a board has no processor."""
+    if not board.processor:
+        legal = ", ".join(_LINUX)
+        fail(f"board '{board.name}' has no processor that runs Linux", hint=f"legal: a board with processor {legal}")
 
 
 def _context(system: DerivedSystem, board: Board, mebibytes: int, *, is_reserved: bool) -> Context:
