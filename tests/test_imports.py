@@ -39,11 +39,12 @@ ALLOWED: dict[str, str] = {
     "ip_xact": "component system text",
     "wrapper": "component text",
     "api": "accelerator builds frame message node runs system text",
+    "pynq": "api frame message node system text",
     "exploration": "accelerator compiler core frame netlist noc node runs system text tools",
     "studio": "accelerator builds converter core exploration frame message node runs scheduling system text tools",
     "cli": (
-        "accelerator builds component converter exploration fabric ip_xact message node runs scheduling studio system "
-        "text tools wrapper"
+        "accelerator builds component converter exploration fabric ip_xact message node pynq runs scheduling studio "
+        "system text tools wrapper"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.

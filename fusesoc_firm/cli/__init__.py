@@ -47,6 +47,7 @@ _MODULES = {
     "registers": "status",
     "ip-xact": "ip_xact",
     "wrap": "wrap",
+    "pynq": "pynq",
     "why": "why",
     "graph": "project",
     "affected": "project",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import command, core_folders, positive, print_warnings
+from fusesoc_firm.cli.common import command, load_on_board, positive
 
 _MEBIBYTES = 16
 
@@ -39,22 +38,10 @@ def add_bring_up(actions: Any) -> argparse.ArgumentParser:
 
 
 def _write_files(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.boards.board import on_board, read_board
     from fusesoc_firm.system.boards.overlay import bring_up_files
-    from fusesoc_firm.system.message_sources import libraries_beside
-    from fusesoc_firm.system.system_core import load_system
     from fusesoc_firm.text.outputs import write
 
-    board = read_board(arguments.board)
-    known = libraries_beside(arguments.spec, arguments.path, arguments.distro, core_folders=core_folders)
-    loaded = load_system(
-        arguments.spec,
-        known,
-        needs_sources=False,
-        changed=partial(on_board, board=board),
-        core_folders=core_folders,
-    )
-    print_warnings(loaded.warnings)
+    loaded, board = load_on_board(arguments)
     files = bring_up_files(loaded.system, board, arguments.memory, is_reserved=arguments.reserve)
     for name, text in files.items():
         write(arguments.output / name, text)

@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -15,6 +16,7 @@ from fusesoc_firm.text.diagnostics import closest, nearest
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.system.boards.board import Board
     from fusesoc_firm.system.system_core import LoadedSystem
     from fusesoc_firm.text.diagnostics import Diagnostic, SourceRef
 
@@ -128,6 +130,28 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
     )
     print_warnings(loaded.warnings)
     return loaded
+
+
+def load_on_board(arguments: argparse.Namespace) -> tuple[LoadedSystem, Board]:
+    """Load the system of the specification in the arguments for the board in them, and print its warnings.
+
+    The board provides the keys that the specification lacks. May raise `InputError`.
+    """
+    from fusesoc_firm.system.boards.board import on_board, read_board
+    from fusesoc_firm.system.message_sources import libraries_beside
+    from fusesoc_firm.system.system_core import load_system
+
+    board = read_board(arguments.board)
+    known = libraries_beside(arguments.spec, arguments.path, arguments.distro, core_folders=core_folders)
+    loaded = load_system(
+        arguments.spec,
+        known,
+        needs_sources=False,
+        changed=partial(on_board, board=board),
+        core_folders=core_folders,
+    )
+    print_warnings(loaded.warnings)
+    return loaded, board
 
 
 def coloured(text: str, *, is_good: bool) -> str:
