@@ -85,11 +85,11 @@ def _context(loaded: LoadedSystem, board: Board, description: NodeDescription) -
     name = overlay_name(loaded, board)
     return {
         "name": name,
+        "bitstream": f"{name}.bit",
         "distribution": name.replace("_", "-"),
         "class": _class_name(description.name),
         "system": description.name,
         "board": board.name,
-        "board_description": str(board.description),
         "version": __version__,
         "width": description.width,
         "longest": repr(description.longest_payload),

@@ -39,6 +39,7 @@ OTHER_FAULTS = {
     ("system/boards/board.py", "check_fits"): "a board that a right specification does not fit on",
     ("system/boards/board.py", "_check_places"): "a board that a right specification does not fit on",
     ("system/boards/overlay.py", "bring_up_files"): "options of the command line",
+    ("system/boards/overlay.py", "check_runs_linux"): "an option of the command line",
     ("system/scaffold/core_file.py", "new_core"): "an option of the command line",
     ("system/scaffold/core_file.py", "updated_core"): "the file of a core",
     ("system/scaffold/project.py", "create"): "options of the command line",
