@@ -8,11 +8,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
 from fusesoc_firm.node.engine.carrier import CarrierError, RosCarrier, RosOptions
 from fusesoc_firm.node.engine.hardware_parameters import HardwareParameters
+from fusesoc_firm.node.engine.log import Level, Log
 from fusesoc_firm.node.engine.queues import Overflow
 from fusesoc_firm.node.engine.software import node_software
 from fusesoc_firm.node.engine.trace import Trace
@@ -26,7 +28,7 @@ from fusesoc_firm.node.status.status_socket import StatusServer, served_names
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.system.written.specification import RELIABLE
-from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 
 @dataclass(frozen=True)
@@ -111,14 +113,19 @@ def run_node(
     `loaded` is the system, if it has software. `address` is that of the transport, if it has one. Raise `InputError` if
     ROS or the hardware fails, or if received messages could not be processed in time.
     """
+    log = Log(_say)
     try:
         with ExitStack() as stack:
-            software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
+            software = (
+                stack.enter_context(node_software(loaded, lambda error: log.warn(str(error)))) if loaded else None
+            )
             trace = (
-                stack.enter_context(closing(Trace(options.trace, description, report=_say))) if options.trace else None
+                stack.enter_context(closing(Trace(options.trace, description, report=log.warn)))
+                if options.trace
+                else None
             )
             registers = status_registers(description, options.status, address)
-            settings = replace(options.settings, report=_say, registers=registers)
+            settings = replace(options.settings, report=log.warn, registers=registers)
             node = Node(
                 description,
                 checked(open_transport, description, registers, settings.parameters),
@@ -131,17 +138,26 @@ def run_node(
             stack.callback(node.close)
             if node.has_status:
                 names = served_names(description.name, address)
-                stack.enter_context(StatusServer(names, node.access_status, _say))
+                stack.enter_context(StatusServer(names, node.access_status, log.warn))
             carriers = {}
             for ros in options.versions:
                 carriers[ros] = stack.enter_context(closing(RosCarrier(ros, description, options.ros)))
-                _say(_topics(carriers[ros], description))
+                log.connect(carriers[ros].log)
+                log.info(_topics(carriers[ros], description))
+            # While the carriers are open.
+            stack.push(partial(_log_end, log, node))
             with _stopped_by_signals(node):
-                is_complete = node.run(carriers)
+                if not node.run(carriers):
+                    fail("some received messages were not processed")
     except (TransportError, CarrierError) as error:
         fail(str(error))
-    if not is_complete:
-        fail("some received messages were not processed")
+
+
+def _log_end(log: Log, node: Node, _: object, error: BaseException | None, __: object) -> None:
+    """Put the counts, and the error that ends the node, into ROS's log; both are printed later."""
+    log.pass_on(Level.INFO, node.statistics.text())
+    if isinstance(error, TransportError | CarrierError | InputError):
+        log.pass_on(Level.ERROR, str(error))
 
 
 def _topics(carrier: RosCarrier, description: NodeDescription) -> str:

@@ -92,7 +92,8 @@ int main(int, char** arguments) {
   const std::string served = arguments[9] && arguments[10] ? arguments[10] : "";
   configuration.has_status = !served.empty();
   std::ostringstream log;
-  configuration.log = &log;
+  const auto report = [&](const std::string& line) { log << line << "\n"; };
+  configuration.log = [&](firm::Level, const std::string& line) { report(line); };
   std::ostringstream published;
   const auto publish = [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
     published << "published " << publisher << " " << to_hex(payload, size) << "\n";
@@ -104,7 +105,7 @@ int main(int, char** arguments) {
   std::optional<firm::StatusServer> server;
   if (!served.empty()) {
     const auto access = [&](const firm::Bytes& request) { return node.access_status(request, std::chrono::seconds(2)); };
-    server.emplace(std::vector<std::string>{served}, access, log);
+    server.emplace(std::vector<std::string>{served}, access, report);
     std::cout << "serves" << std::endl;
   }
   int status = -1;

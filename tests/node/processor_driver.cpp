@@ -82,7 +82,7 @@ int main(int, char** words) {
   system.restarts = static_cast<unsigned>(std::stoul(words[5]));
   system.restart_delay = std::chrono::milliseconds(10);
   system.settling_time = std::chrono::seconds(2);
-  system.log = &std::cout;
+  system.log = [](firm::Level, const std::string& line) { std::cout << line << std::endl; };
   Answers answers{messages, count};
   firm::Node* running = nullptr;
   firm::Node node(

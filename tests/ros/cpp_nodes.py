@@ -240,6 +240,11 @@ class NodeProcess:
         path = Path(f"/proc/{self.process.pid}/task")
         return [int(word) for task in path.iterdir() for word in (task / "children").read_text().split()]
 
+    def kill_child(self, word: str) -> None:
+        """Kill what it started with `word` in its command line."""
+        (number,) = [number for line, number in self.children().items() if word in line]
+        os.kill(number, signal.SIGKILL)
+
     def wait_until_said(self, text: str, times: int = 1) -> None:
         """Wait until it has printed a text so many times."""
         while self.said().count(text) < times:

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -55,11 +54,6 @@ class LiveNode(NodeProcess):
     def wait_until_ready(self) -> None:
         """Wait until it is a node of ROS, its simulator being built."""
         self.wait_until_said(" is a node of ROS ")
-
-    def kill_child(self, word: str) -> None:
-        """Kill what it started with `word` in its command line."""
-        (number,) = [number for line, number in self.children().items() if word in line]
-        os.kill(number, signal.SIGKILL)
 
 
 def paced(ros: Ros, rate: int, seconds: float, ways: Sequence[tuple[str, str]], *kind: str) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from _pytest.mark.structures import ParameterSet
@@ -95,3 +96,45 @@ def diagnoses(ros: Ros, name: str) -> Iterator[Iterator[dict[str, int]]]:
             yield ({key: int(value) for key, value in values.items()} for values in own)
         finally:
             peer.kill()
+
+
+class LogPeer:
+    """A node of ROS that reads the log."""
+
+    def __init__(self, ros: Ros) -> None:
+        command = [ros.python, str(Path(__file__).with_name("log_peer.py")), str(ros.version)]
+        self._process = subprocess.Popen(command, env=dict(ros.environment), stdout=subprocess.PIPE, text=True)
+        self.lines: list[dict[str, Any]] = []
+
+    def wait_until_connected(self) -> None:
+        """Wait until it has the log of a node."""
+        while self._next() != {"connected": True}:
+            pass
+
+    def wait_for(self, text: str) -> dict[str, Any]:
+        """The first line that contains a text."""
+        while not (found := [line for line in self.lines if text in line["text"]]):
+            self._next()
+        return found[0]
+
+    def _next(self) -> dict[str, Any]:
+        assert self._process.stdout
+        line: dict[str, Any] = json.loads(self._process.stdout.readline())
+        if "text" in line:
+            self.lines.append(line)
+        return line
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+@contextmanager
+def log_of(ros: Ros) -> Iterator[LogPeer]:
+    """A peer with the log of the node that runs."""
+    peer = LogPeer(ros)
+    try:
+        peer.wait_until_connected()
+        yield peer
+    finally:
+        peer.kill()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from fusesoc_firm.cli import main
 from tests.ros.cpp_nodes import Node, NodeProcess
 from tests.ros.live_nodes import LiveNode
-from tests.ros.places import Place, running, versions
+from tests.ros.places import Place, log_of, running, versions
 from tests.system.simulated.test_parameters import specification
 
 pytestmark = pytest.mark.check
@@ -131,3 +132,13 @@ def test_a_first_value_outside_of_the_range_ends_the_node(place: Place, spec: Pa
     with started(place, spec, language, first_values(place, gain=101)) as node:
         assert node.process.wait(60) == 1
         assert "the parameter 'block.gain' cannot be set: 101 is outside of the range; legal: -4 to 100" in node.said()
+
+
+@LANGUAGES
+def test_a_refused_value_is_a_warning_in_the_log(place: Place, spec: Path, language: str) -> None:
+    with started(place, spec, language, first_values(place, gain=2)) as node, log_of(place.ros) as peer:
+        name = "/tuning_node" if language == "cpp" else "/tuning"
+        assert steps(place, name, ("set", "block.gain", 101))[0]
+        line = peer.wait_for(" is not set: ")
+        assert line["level"] == logging.WARNING and "gain" in line["text"]
+        assert node.said().count(line["text"]) == 1

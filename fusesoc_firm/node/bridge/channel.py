@@ -24,6 +24,8 @@ CALL, ANSWER = b"Q", b"A"
 # PARAMETERS, from the bridge: new values of parameters, as JSON with the number of the request; to the bridge: the
 # reason why they are refused, or an empty text, in the same form.
 PARAMETERS = b"V"
+# LOG, to the bridge: a line for ROS's log, as text; the topic is its level, a number of `logging`.
+LOG = b"G"
 # The number of the topic `/diagnostics`.
 DIAGNOSTICS = 0xFFFF
 # STOP, to the bridge: accept no more messages. From the bridge: ROS requests the end of the node.

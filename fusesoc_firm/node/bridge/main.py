@@ -22,6 +22,7 @@ from .channel import (
     CONFIGURE,
     DIAGNOSTICS,
     FAULT,
+    LOG,
     MESSAGE,
     PARAMETERS,
     PUBLISHED,
@@ -52,6 +53,8 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
             ros.call(parcel.topic, *unpack_call(parcel.data))
         elif parcel.kind == PARAMETERS:
             ros.parameters_set(parcel.data)
+        elif parcel.kind == LOG:
+            ros.log(parcel.topic, parcel.data.decode(errors="replace"))
         elif parcel.kind == STOP:
             ros.stop()
     ros.end()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import logging
 import queue
 import sys
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import Any
 
 from .channel import ANSWER, CALL, LOST, MESSAGE, PARAMETERS, READY, Channel, pack_answer, pack_call, unpack_answer
@@ -164,7 +166,20 @@ class Ros(ABC):
         """Report a text to the user, once."""
         if text not in self._reported:
             self._reported.add(text)
-            print(text, file=sys.stderr, flush=True)
+            self.warn(text)
+
+    def warn(self, text: str) -> None:
+        """Print a text for the user, and put it into ROS's log."""
+        print(text, file=sys.stderr, flush=True)
+        self.log(logging.WARNING, text)
+
+    def refused(self, names: Iterable[str], reason: str) -> None:
+        """Report parameters that are not set, by their names in ROS."""
+        self.warn(f"the parameter {', '.join(names)} is not set: {reason}")
+
+    @abstractmethod
+    def log(self, level: int, text: str) -> None:
+        """Put a line that the terminal shows into ROS's log, with a level of `logging`; any thread may call it."""
 
     def end(self) -> None:
         """Make `spin` return; any thread may call it."""

@@ -15,6 +15,9 @@ from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, Gaps, Ros, type_report
 from .ros1_parameters import Watch
 from .ros1_services import Caller, raw_service
 
+# The attribute of a log's record that the terminal shows already.
+_PRINTED = "is_printed"
+
 
 class Ros1(Ros):
     """A ROS 1 node through rospy, which does not require installed message packages."""
@@ -23,16 +26,21 @@ class Ros1(Ros):
         super().__init__(config, channel)
         # rospy reads remappings from here, some of them when it is imported.
         sys.argv = [config["name"], *arguments]
+        import rosgraph.roslogging  # type: ignore[import-not-found, unused-ignore]
         import rospy
 
         self._rospy = rospy
         _warn_without_master()
         rospy.init_node(config["name"], disable_signals=True)
+        self._log = logging.getLogger("rosout")
         # rospy's reports of refused peers.
-        logging.getLogger("rosout").addFilter(_Once())
+        self._log.addFilter(_Once())
+        for handler in self._log.handlers:
+            if isinstance(handler, rosgraph.roslogging.RosStreamHandler):
+                handler.addFilter(_is_not_printed)
         rospy.on_shutdown(self._stopped_by_ros)
         if config["parameters"]:
-            Watch(rospy, config["parameters"], self.set_parameters, self._ended).start()
+            Watch(rospy, config["parameters"], self, self._ended).start()
         given = [*config["publishers"], config["diagnostics"]]
         self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in given}
         self._publishers = {
@@ -97,6 +105,10 @@ class Ros1(Ros):
         """Call a service, in the thread of its client."""
         self._callers[service].put(number, payload)
 
+    def log(self, level: int, text: str) -> None:
+        """Put a line into the topic and the file of ROS's log."""
+        self._log.log(level, "%s", text, extra={_PRINTED: True})
+
     def _stopped_by_ros(self) -> None:
         """Report a stop by ROS, such as `rosnode kill`.
 
@@ -148,10 +160,15 @@ class Ros1(Ros):
     def close(self) -> None:
         """Wait until published messages have been sent, then end the node."""
         latest = time.monotonic() + FLUSH_SECONDS
-        for publisher in self._publishers.values():
+        for publisher in [*self._publishers.values(), self._log_publisher()]:
             for connection in list(publisher.impl.connections):
                 _flush(connection, latest)
         self._rospy.signal_shutdown("the hardware is disconnected")
+
+    def _log_publisher(self) -> Any:
+        import rospy.impl.rosout as log
+
+        return log._rosout_pub  # noqa: SLF001 - rospy has no public name for it
 
 
 class _Once(logging.Filter):
@@ -168,6 +185,11 @@ class _Once(logging.Filter):
         if "inbound connection" in text:
             self._known.add(text)
         return not is_known
+
+
+def _is_not_printed(record: logging.LogRecord) -> bool:
+    """Return whether the terminal does not show a line yet."""
+    return not hasattr(record, _PRINTED)
 
 
 def _warn_without_master() -> None:

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
 from typing import Any
+
+from .ros import Ros
 
 # The interval in s at which the values are compared; rospy's cache follows the master.
 _LOOK_SECONDS = 0.1
 
 
 class Watch(threading.Thread):
-    """A thread that lets `ask` set the values that change in the master.
+    """A thread that lets `ros` set the values that change in the master.
 
-    `ask` returns the reason of a refusal, or an empty text; the master then gets the value that is in effect.
+    The master gets back the value that is in effect if a new one is refused.
     """
 
-    def __init__(
-        self, rospy: Any, parameters: list[dict[str, Any]], ask: Callable[[dict[str, Any]], str], ended: threading.Event
-    ) -> None:
+    def __init__(self, rospy: Any, parameters: list[dict[str, Any]], ros: Ros, ended: threading.Event) -> None:
         super().__init__(daemon=True)
         self._rospy = rospy
-        self._ask = ask
+        self._ros = ros
         self._ended = ended
         self._values = {item["name"]: item["value"] for item in parameters}
         for name, value in self._values.items():
@@ -39,11 +38,11 @@ class Watch(threading.Thread):
                         self._change(name, found)
 
     def _change(self, name: str, wanted: Any) -> None:
-        reason = self._ask({name: wanted})
+        reason = self._ros.set_parameters({name: wanted})
         if not reason:
             self._values[name] = wanted
             return
-        self._rospy.logwarn(f"the parameter {_private(name)} is not set: {reason}")
+        self._ros.refused([_private(name)], reason)
         self._rospy.set_param(_private(name), self._values[name])
 
 

@@ -11,9 +11,12 @@ from typing import Any
 from .channel import DIAGNOSTICS, DONE, STOP, Channel
 from .managed import managed_node, waiting_group
 from .ros import FLUSH_SECONDS, KINDS, LOOK_SECONDS, BridgeError, Ends, Gaps, Ros, type_report
+from .ros2_log import Log
 from .ros2_parameters import declare
 from .ros2_types import SERVICE_DEPTH, message_class, service_class
 
+# The argument of ROS 2 for nodes without the topic of the log.
+_NO_LOG = "--disable-rosout-logs"
 # The calls of a service that may be answered late.
 _MOST_PENDING = 100
 
@@ -33,7 +36,8 @@ class Ros2(Ros):
         # A node with lifecycle states carries messages, calls and goals only while it is active.
         self._is_active = not config["is_managed"]
         self._node = rclpy.create_node(config["name"]) if self._is_active else self._managed(config["name"])
-        declare(self._node, config["parameters"], self.set_parameters)
+        self._log = None if _NO_LOG in arguments else Log(self._node)
+        declare(self._node, config["parameters"], self)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         # The number of callbacks so far.
@@ -265,6 +269,11 @@ class Ros2(Ros):
         if topic in self._publishers and (self._is_active or topic == DIAGNOSTICS):
             self._publishers[topic].publish(payload)
 
+    def log(self, level: int, text: str) -> None:
+        """Put a line into the topic of ROS's log."""
+        if self._log:
+            self._log.put(level, text)
+
     def stop(self) -> None:
         """Make `spin` process the messages that have already arrived, but no further ones."""
         self._stops_at = time.monotonic() + FLUSH_SECONDS
@@ -295,9 +304,10 @@ class Ros2(Ros):
         """Wait until published messages have been sent, then end the node."""
         from rclpy.duration import Duration
 
-        for topic in self._config["publishers"]:
-            if topic["is_reliable"]:
-                self._publishers[topic["number"]].wait_for_all_acked(Duration(seconds=FLUSH_SECONDS))
+        topics = [topic for topic in self._config["publishers"] if topic["is_reliable"]]
+        log = [self._log.publisher] if self._log else []
+        for publisher in [*(self._publishers[topic["number"]] for topic in topics), *log]:
+            publisher.wait_for_all_acked(Duration(seconds=FLUSH_SECONDS))
         self._node.destroy_node()
         self._rclpy.shutdown()
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
+
+from .ros import Ros
 
 _KINDS = {"bool": "BOOL", "float32": "DOUBLE"}
 
 
-def declare(node: Any, parameters: list[dict[str, Any]], ask: Callable[[dict[str, Any]], str]) -> None:
-    """Declare the parameters, and let `ask` set their values; it returns the reason of a refusal, or an empty text."""
+def declare(node: Any, parameters: list[dict[str, Any]], ros: Ros) -> None:
+    """Declare the parameters, and let `ros` set their values and report refused ones."""
     from rcl_interfaces.msg import SetParametersResult
 
     for item in parameters:
@@ -18,10 +19,20 @@ def declare(node: Any, parameters: list[dict[str, Any]], ask: Callable[[dict[str
 
     def change(changed: list[Any]) -> Any:
         values = {item.name: item.value for item in changed if item.name in own}
-        reason = ask(values) if values else ""
+        reason = ros.set_parameters(values) if values else ""
         return SetParametersResult(successful=not reason, reason=reason)
 
+    set_all = node.set_parameters_atomically
+
+    def reported(wanted: list[Any]) -> Any:
+        result = set_all(wanted)
+        if not result.successful:
+            ros.refused([item.name for item in wanted], result.reason)
+        return result
+
     node.add_on_set_parameters_callback(change)
+    # rclpy refuses values outside of the range before its callbacks; its services call this method.
+    node.set_parameters_atomically = reported
 
 
 def _descriptor(item: dict[str, Any]) -> Any:

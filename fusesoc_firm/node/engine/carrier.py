@@ -281,6 +281,10 @@ class RosCarrier:
         """Publish a report on `/diagnostics`."""
         self._send(bridge.MESSAGE, bridge.DIAGNOSTICS, diagnostics_payload(self._ros, report))
 
+    def log(self, level: int, text: str) -> None:
+        """Put a line into ROS's log, with a level of `logging`; the terminal does not show it again."""
+        self._send(bridge.LOG, level, text.encode())
+
     def stop(self) -> None:
         """Accept no more messages."""
         self._send(bridge.STOP)

@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <iostream>
 #include <iterator>
 #include <list>
 #include <map>
@@ -23,6 +22,7 @@
 
 #include <firm/action.hpp>
 #include <firm/action_messages.hpp>
+#include <firm/log.hpp>
 #include <firm/services.hpp>
 
 namespace firm {
@@ -431,7 +431,7 @@ class ActionServer {
 
   void report(const std::string& text) {
     const Lock lock(mutex_);
-    if (reported_++ < kMostReports) std::cerr << text << std::endl;
+    if (reported_++ < kMostReports) node_log().say(Level::kWarning, text);
   }
 
   const Action action_;

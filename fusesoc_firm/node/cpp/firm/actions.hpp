@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -19,6 +18,7 @@
 #include <firm/action_client.hpp>
 #include <firm/action_messages.hpp>
 #include <firm/action_server.hpp>
+#include <firm/log.hpp>
 #include <firm/services.hpp>
 #include <firm/topic.hpp>
 
@@ -202,7 +202,7 @@ class NodeActions {
       try {
         take(Bytes(data, data + size));
       } catch (const MessageError& error) {
-        std::cerr << "a message of an action is ignored: " << error.what() << std::endl;
+        node_log().say(Level::kWarning, std::string("a message of an action is ignored: ") + error.what());
       }
     };
   }

@@ -7,13 +7,13 @@
 
 #include <chrono>
 #include <cstdint>
-#include <iostream>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <firm/action.hpp>
+#include <firm/log.hpp>
 #include <firm/node.hpp>
 #include <firm/services.hpp>
 #include <firm/topic.hpp>
@@ -121,7 +121,7 @@ class Diagnosis {
     try {
       publish_ = ros.advertise(topic, topic.quality);
     } catch (const MiddlewareError& error) {
-      std::cerr << topic.name << " is not published: " << error.what() << std::endl;
+      node_log().say(Level::kWarning, topic.name + " is not published: " + error.what());
     }
   }
 

@@ -32,6 +32,7 @@
 #include <firm/bursts.hpp>
 #include <firm/content.hpp>
 #include <firm/faults.hpp>
+#include <firm/log.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/queues.hpp>
 #include <firm/status_exchange.hpp>
@@ -65,7 +66,7 @@ struct NodeConfiguration {
   std::function<void(unsigned publisher)> on_aborted = nullptr;
   std::function<void()> on_restart = nullptr;
   std::function<void()> on_rest = nullptr;
-  std::ostream* log = nullptr;    // one line per fault
+  std::function<void(Level level, const std::string& line)> log = nullptr;  // one line per fault
   std::ostream* trace = nullptr;  // CSV, one line per step of a message (firm/trace.hpp)
 };
 
@@ -91,7 +92,7 @@ class Node {
         publish_(std::move(publish)),
         queues_(depths(configuration_),
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
-        trace_(configuration_.trace, configuration_.log),
+        trace_(configuration_.trace, [this](const std::string& line) { log(Level::kWarning, line); }),
         status_([this](const Bytes& request) { put_request(request); }) {
     for (const auto& [subscriber, other] : configuration_.shared_queues) queues_.share(subscriber, other);
   }
@@ -141,7 +142,7 @@ class Node {
     }
     std::optional<std::string> fault = session();
     while (fault && may_restart()) {
-      log(*fault + "; the transport is opened again");
+      log(Level::kWarning, *fault + "; the transport is opened again");
       ++restarts_;
       if (configuration_.on_restart) configuration_.on_restart();
       wait_before_restart();
@@ -151,7 +152,7 @@ class Node {
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
     if (is_abandoned_) fault = "the time limit for stopping expired before all frames were sent and received";
-    if (fault) log(error_ = *fault);
+    if (fault) log(Level::kError, error_ = *fault);
     has_ended_ = true;
     changed_.notify_all();
     return fault ? 1 : 0;
@@ -397,7 +398,7 @@ class Node {
 
   void note(const BurstError& error) {
     ++errors_;
-    log(error.what());
+    log(Level::kWarning, error.what());
   }
 
   void note(const HardwareError& error) {
@@ -405,21 +406,23 @@ class Node {
     const std::string where = error.cycle ? " in cycle " + std::to_string(*error.cycle) : "";
     const std::string who = error.converter ? "converter " + std::to_string(*error.converter) : "the link or the Manager";
     const bool is_known = error.code > 0 && error.code < std::size(kFaultTexts);
-    log(who + " reports an error" + where + (is_known ? std::string(": ") + kFaultTexts[error.code] : ""));
+    log(Level::kWarning,
+        who + " reports an error" + where + (is_known ? std::string(": ") + kFaultTexts[error.code] : ""));
     const bool is_subscriber = error.converter && *error.converter < configuration_.subscribers;
     if (is_subscriber && configuration_.on_rejected) configuration_.on_rejected(*error.converter);
   }
 
-  void log(const std::string& line) {
+  void log(Level level, const std::string& line) {
     if (!configuration_.log) return;
     const std::lock_guard<std::mutex> lock(log_mutex_);
-    *configuration_.log << line << std::endl;
+    configuration_.log(level, line);
   }
 
   const NodeConfiguration configuration_;
   const Open open_;
   const Publish publish_;
   SubscriberQueues<Numbered> queues_;
+  std::mutex log_mutex_;  // before the trace, whose end may be a fault
   Trace trace_;
   StatusExchange status_;
   std::optional<Numbered> unsent_;  // used by the sender only
@@ -429,7 +432,6 @@ class Node {
   std::atomic<bool> is_session_over_{false};
   std::atomic<std::int64_t> moved_{0};  // time of the last frame sent or burst received, ns
 
-  std::mutex log_mutex_;
   mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   Transport* transport_ = nullptr;  // only during a session

@@ -15,12 +15,12 @@
 
 #include <ros/callback_queue.h>
 #include <ros/subscription_callback_helper.h>
+#include <rosgraph_msgs/Log.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <functional>
-#include <iostream>
 #include <map>
 #include <memory>
 #include <set>
@@ -33,6 +33,7 @@
 #include <variant>
 #include <vector>
 
+#include <firm/log.hpp>
 #include <firm/parameters.hpp>
 #include <firm/ros1_services.hpp>
 #include <firm/topic.hpp>
@@ -91,6 +92,7 @@ class Ros1 {
   }
 
   ~Ros1() {
+    node_log().connect({});
     subscribers_.clear();
     servers_.clear();
     // This ends calls of servers that do not answer.
@@ -110,6 +112,8 @@ class Ros1 {
     }
     node_ = std::make_unique<ros::NodeHandle>();
     node_->setCallbackQueue(&callbacks_);
+    const auto log = node_->advertise<rosgraph_msgs::Log>("/rosout", kLogDepth, true);
+    node_log().connect([log](Level level, const std::string& line) { log.publish(log_message(level, line)); });
     return true;
   }
 
@@ -212,6 +216,20 @@ class Ros1 {
   void flush() { std::this_thread::sleep_for(std::chrono::milliseconds(300)); }
 
  private:
+  static constexpr std::uint32_t kLogDepth = 1000;
+
+  static rosgraph_msgs::Log log_message(Level level, const std::string& line) {
+    rosgraph_msgs::Log message;
+    message.header.stamp = ros::Time::now();
+    message.level = level == Level::kInfo      ? rosgraph_msgs::Log::INFO
+                    : level == Level::kWarning ? rosgraph_msgs::Log::WARN
+                                               : rosgraph_msgs::Log::ERROR;
+    message.name = ros::this_node::getName();
+    message.msg = line;
+    ros::this_node::getAdvertisedTopics(message.topics);
+    return message;
+  }
+
   // Return the name in the master, whose parts are separated by slashes.
   static std::string private_name(std::string name) {
     std::replace(name.begin(), name.end(), '.', '/');
@@ -259,7 +277,7 @@ class Ros1 {
         reason = fault.what();
       }
       if (reason.empty()) continue;
-      ROS_WARN("the parameter %s is not set: %s", private_name(parameter.name).c_str(), reason.c_str());
+      node_log().say(Level::kWarning, "the parameter " + private_name(parameter.name) + " is not set: " + reason);
       put_back(parameter.name, before);
     }
   }
@@ -285,7 +303,7 @@ class Ros1 {
       if (known == types_.end() || found == "*" || found == known->second) continue;
       const std::string report = "another node uses " + name + " with the type " + found + ", which is " +
                                  known->second + " here; no messages are exchanged";
-      if (reported_.insert(report).second) std::cerr << report << std::endl;
+      if (reported_.insert(report).second) node_log().say(Level::kWarning, report);
     }
   }
 

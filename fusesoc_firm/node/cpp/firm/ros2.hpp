@@ -17,6 +17,7 @@
 #include <rcl/init.h>
 #include <rcl/init_options.h>
 #include <rcl/logging.h>
+#include <rcl/logging_rosout.h>
 #include <rcl/node.h>
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
@@ -28,7 +29,6 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
-#include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -40,6 +40,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/log.hpp>
 #include <firm/rcl.hpp>
 #include <firm/ros2_lifecycle.hpp>
 #include <firm/ros2_parameters.hpp>
@@ -70,6 +71,7 @@ class Ros2 {
   }
 
   ~Ros2() {
+    node_log().connect({});
     unsubscribe();
     lifecycle_.reset();
     servers_.clear();
@@ -92,10 +94,13 @@ class Ros2 {
   bool start(const std::function<bool()>&) {
     const rcl_allocator_t allocator = rcl_get_default_allocator();
     check_rcl(rcl_logging_configure(&context_.global_arguments, &allocator), "log");
-    const rcl_node_options_t options = rcl_node_get_default_options();
+    rcl_node_options_t options = rcl_node_get_default_options();
+    // The log of rcl does not wait until its readers have received a line.
+    options.enable_rosout = false;
     check_rcl(rcl_node_init(&node_, name_.c_str(), "", &context_, &options), "create the node " + name_);
     check_rcl(rcl_wait_set_init(&waiting_, 0, 0, 0, 0, 0, 0, &context_, allocator), "wait for messages");
     is_started_ = true;
+    if (rcl_logging_rosout_enabled()) open_log();
     return true;
   }
 
@@ -182,21 +187,10 @@ class Ros2 {
 
   // Return a function that publishes messages of a topic. Both this call and the function throw MiddlewareError.
   MessageHandler advertise(const Topic& topic, const Quality& quality) {
-    auto made = std::make_unique<Publisher>();
-    made->type = topic.type;
-    rcl_publisher_options_t options = rcl_publisher_get_default_options();
-    options.qos = profile(quality);
-    check_rcl(rcl_publisher_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
-              "advertise " + topic.name);
-    publishers_.push_back(std::move(made));
-    return [this, publisher = &publishers_.back()->rcl, name = topic.name, is_managed = lifecycle_ != nullptr](
-               const std::uint8_t* data, std::size_t size) {
-      if (is_managed && !is_active_) return;
-      rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
-      // The buffer is only read; the structure serves both directions.
-      message.buffer = const_cast<std::uint8_t*>(data);
-      message.buffer_length = message.buffer_capacity = size;
-      check_rcl(rcl_publish_serialized_message(publisher, &message, nullptr), "publish on " + name);
+    MessageHandler publish = advertise(topic, profile(quality));
+    if (!lifecycle_) return publish;
+    return [this, publish = std::move(publish)](const std::uint8_t* data, std::size_t size) {
+      if (is_active_) publish(data, size);
     };
   }
 
@@ -262,6 +256,49 @@ class Ros2 {
   }
 
  private:
+  // Return a function that publishes messages in every state of the node. Both throw MiddlewareError.
+  MessageHandler advertise(const Topic& topic, const rmw_qos_profile_t& quality) {
+    auto made = std::make_unique<Publisher>();
+    made->type = topic.type;
+    rcl_publisher_options_t options = rcl_publisher_get_default_options();
+    options.qos = quality;
+    check_rcl(rcl_publisher_init(&made->rcl, &node_, type_support(topic), topic.name.c_str(), &options),
+              "advertise " + topic.name);
+    publishers_.push_back(std::move(made));
+    return [publisher = &publishers_.back()->rcl, name = topic.name](const std::uint8_t* data, std::size_t size) {
+      rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
+      // The buffer is only read; the structure serves both directions.
+      message.buffer = const_cast<std::uint8_t*>(data);
+      message.buffer_length = message.buffer_capacity = size;
+      check_rcl(rcl_publish_serialized_message(publisher, &message, nullptr), "publish on " + name);
+    };
+  }
+
+  // Put the lines of the node into ROS's log.
+  void open_log() {
+    const auto publish = advertise(own_topic("/rosout", "Log"), rcl_qos_profile_rosout_default);
+    const std::string logger = rcl_node_get_logger_name(&node_);
+    node_log().connect([publish, logger](Level level, const std::string& line) {
+      if (!rcutils_logging_logger_is_enabled_for(logger.c_str(), static_cast<int>(level))) return;
+      CdrWriter message;
+      message.now().number(static_cast<std::uint8_t>(level)).text(logger).text(line).text("").text("");
+      message.number(std::uint32_t{0});  // neither a file nor a function nor a line of the source
+      try {
+        publish(message.bytes.data(), message.bytes.size());
+      } catch (const MiddlewareError&) {
+        // The terminal has the line.
+      }
+    });
+  }
+
+  // Return a topic of each node of ROS 2, with a message of rcl_interfaces.
+  static Topic own_topic(const std::string& name, const std::string& message) {
+    Topic topic{};
+    topic.name = name;
+    topic.type = "rcl_interfaces/msg/" + message;
+    return topic;
+  }
+
   // Start or stop carrying messages. For clients, an inactive node has no services and actions. Throws
   // MiddlewareError.
   void change(bool is_active) {
@@ -424,7 +461,7 @@ class Ros2 {
       if (end.topic_type == type || !is_due(end)) continue;
       const std::string report = std::string(end.node_name) + " " + verb + " " + topic + " with the type " +
                                  end.topic_type + ", which is " + type + " here; no messages are exchanged";
-      if (reported_.insert(report).second) std::cerr << report << std::endl;
+      if (reported_.insert(report).second) node_log().say(Level::kWarning, report);
     }
     ignore(rmw_topic_endpoint_info_array_fini(&ends, &allocator));
   }

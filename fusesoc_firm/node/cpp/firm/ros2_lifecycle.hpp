@@ -16,11 +16,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <iostream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <firm/log.hpp>
 #include <firm/rcl.hpp>
 #include <firm/ros2_services.hpp>
 #include <firm/topic.hpp>
@@ -138,7 +138,7 @@ class Lifecycle {
       }
       return true;
     } catch (const MiddlewareError& error) {
-      std::cerr << error.what() << std::endl;
+      node_log().say(Level::kWarning, error.what());
       return false;
     }
   }

@@ -3,6 +3,7 @@
 // the parameters of the hardware. Requests and responses are bytes in CDR. C++17.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/log.hpp>
 #include <firm/parameters.hpp>
 #include <firm/services.hpp>
 #include <firm/transport.hpp>
@@ -68,6 +70,14 @@ class CdrWriter {
     bytes.insert(bytes.end(), value.begin(), value.end());
     bytes.push_back(0);
     return *this;
+  }
+
+  // Write the time as builtin_interfaces/msg/Time.
+  CdrWriter& now() {
+    const auto since = std::chrono::system_clock::now().time_since_epoch();
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(since);
+    const auto rest = std::chrono::duration_cast<std::chrono::nanoseconds>(since - seconds);
+    return number(static_cast<std::int32_t>(seconds.count())).number(static_cast<std::uint32_t>(rest.count()));
   }
 
   CdrWriter& count(std::size_t value) { return number(static_cast<std::uint32_t>(value)); }
@@ -216,8 +226,20 @@ class ParameterServices {
     return out.bytes;
   }
 
-  // Return why values cannot be set, or an empty text.
-  std::string set_all(const std::vector<std::pair<std::string, std::pair<Type, ParameterValue>>>& wanted) {
+  using Wanted = std::vector<std::pair<std::string, std::pair<Type, ParameterValue>>>;
+
+  // Set values, all or none. Report why they are refused, and return the reason, or an empty text.
+  std::string set_all(const Wanted& wanted) {
+    const std::string reason = tried(wanted);
+    if (reason.empty()) return "";
+    std::string names;
+    for (const auto& item : wanted) names += (names.empty() ? "" : ", ") + item.first;
+    node_log().say(Level::kWarning, "the parameter " + names + " is not set: " + reason);
+    return reason;
+  }
+
+  // Return why values are not set, or an empty text.
+  std::string tried(const Wanted& wanted) {
     HardwareParameters::Values values;
     for (const auto& [name, typed] : wanted) {
       const Parameter* parameter = find(name);
@@ -244,7 +266,7 @@ class ParameterServices {
 
   Bytes set_atomically(CdrReader request) {
     CdrWriter out;
-    std::vector<std::pair<std::string, std::pair<Type, ParameterValue>>> wanted;
+    Wanted wanted;
     request.skip([&] { wanted.push_back(read_parameter(request)); });
     write_result(out, set_all(wanted));
     return out.bytes;

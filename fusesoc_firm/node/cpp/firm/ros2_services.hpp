@@ -9,7 +9,6 @@
 #include <rcl/service.h>
 #include <rmw/rmw.h>
 
-#include <iostream>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -17,6 +16,7 @@
 #include <string>
 #include <utility>
 
+#include <firm/log.hpp>
 #include <firm/rcl.hpp>
 #include <firm/services.hpp>
 #include <firm/topic.hpp>
@@ -148,7 +148,7 @@ class RawServer {
       check_rcl(rcl_send_response(&rcl_, &header, response.structure()), "respond to a call of " + service_.name);
     } catch (const MiddlewareError& error) {
       // The client has ended, or the response is malformed.
-      std::cerr << error.what() << std::endl;
+      node_log().say(Level::kWarning, error.what());
     }
   }
 

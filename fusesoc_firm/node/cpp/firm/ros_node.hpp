@@ -19,6 +19,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -27,6 +28,7 @@
 
 #include <firm/actions.hpp>
 #include <firm/diagnostics.hpp>
+#include <firm/log.hpp>
 #include <firm/node.hpp>
 #include <firm/open_transport.hpp>
 #include <firm/parameters.hpp>
@@ -309,7 +311,7 @@ class Engines {
     configuration.overflow = arguments.overflow;
     configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
     configuration.has_status = system.has_status_frames();
-    configuration.log = &std::cerr;
+    configuration.log = [](Level level, const std::string& line) { node_log().say(level, line); };
     configuration.trace = trace;
     if (!system.services.empty() || !system.actions.empty()) watch_calls(configuration);
     // A simulator's registers cannot be accessed.
@@ -367,7 +369,7 @@ class Engines {
       try {
         for (const auto& take : takers) take(payload, size);
       } catch (const std::length_error& fault) {
-        std::cerr << name << ": " << fault.what() << std::endl;
+        node_log().say(Level::kWarning, name + ": " + fault.what());
       }
     };
   }
@@ -459,7 +461,7 @@ class Engines {
   // Return a function that records and reports an error of a thread.
   FaultHandler fault_taker() {
     return [this](const std::string& reason) {
-      std::cerr << reason << std::endl;
+      node_log().say(Level::kError, reason);
       has_fault_ = true;
     };
   }
@@ -518,24 +520,29 @@ inline std::uint32_t word_at(Engines& engines, std::uint32_t address) {
   return status_word(engines.access_status(status_request(address, 0), std::chrono::seconds(1)));
 }
 
-// Print an engine's counts.
-// `lost` messages were published, but ROS did not deliver them.
-inline void print_statistics(const std::string& name, const Node& node, std::uint64_t lost = 0) {
+// Return the line of an engine's counts; `lost` messages were published, but ROS did not deliver them.
+inline std::string statistics_line(const std::string& name, const Node& node, std::uint64_t lost = 0) {
   const NodeStatistics counted = node.statistics();
-  std::cerr << name << ": " << counted.received << " received, " << counted.dropped << " dropped, " << counted.sent
-            << " sent, " << counted.published << " published, " << counted.errors << " errors, " << counted.restarts
-            << " restarts, " << lost << " lost by ROS" << std::endl;
+  std::ostringstream line;
+  line << name << ": " << counted.received << " received, " << counted.dropped << " dropped, " << counted.sent
+       << " sent, " << counted.published << " published, " << counted.errors << " errors, " << counted.restarts
+       << " restarts, " << lost << " lost by ROS";
+  return line.str();
 }
 
-inline void print_calls(const std::string& block, const CallStatistics& counted) {
-  std::cerr << block << ": " << counted.called << " called, " << counted.answered << " answered, " << counted.failed
-            << " failed, " << counted.unasked << " unasked" << std::endl;
+inline std::string calls_line(const std::string& block, const CallStatistics& counted) {
+  std::ostringstream line;
+  line << block << ": " << counted.called << " called, " << counted.answered << " answered, " << counted.failed
+       << " failed, " << counted.unasked << " unasked";
+  return line.str();
 }
 
-inline void print_goals(const std::string& block, const GoalStatistics& counted) {
-  std::cerr << block << ": " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
-            << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
-            << " unasked, " << counted.lost << " lost" << std::endl;
+inline std::string goals_line(const std::string& block, const GoalStatistics& counted) {
+  std::ostringstream line;
+  line << block << ": " << counted.goals << " goals, " << counted.succeeded << " succeeded, " << counted.canceled
+       << " canceled, " << counted.aborted << " aborted, " << counted.rejected << " rejected, " << counted.unasked
+       << " unasked, " << counted.lost << " lost";
+  return line.str();
 }
 
 // The services and actions while they are connected to a middleware, which outlives them.
@@ -595,7 +602,8 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   std::optional<StatusServer> server;
   if (engines.has_status()) {
     const auto access = [&](const Bytes& request) { return engines.access_status(request, std::chrono::seconds(5)); };
-    server.emplace(served_names(system.name, arguments.transport), access, std::cerr);
+    server.emplace(served_names(system.name, arguments.transport), access,
+                   [](const std::string& line) { node_log().say(Level::kWarning, line); });
     watch.emplace([&](std::uint32_t address) { return word_at(engines, address); }, system.channels);
   }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
@@ -617,11 +625,48 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   if (software && is_running()) engines.settle(arguments.drain);
   int status = software ? software->stop() : 0;
   status = std::max({status, hardware.stop(), engines.has_fault() ? 1 : 0});
+  std::vector<std::string> lines{statistics_line(system.name + "_node", engines.hardware(), ros.lost())};
+  if (software) lines.push_back(statistics_line("its software", *engines.software()));
+  engines.for_each_count([&](const auto&... counts) { lines.push_back(calls_line(counts...)); },
+                         [&](const auto&... counts) { lines.push_back(goals_line(counts...)); });
+  // ROS's log has to get them before its end, and the terminal after all messages.
+  for (const auto& line : lines) node_log().pass(Level::kInfo, line);
   ros.flush();
-  print_statistics(system.name + "_node", engines.hardware(), ros.lost());
-  if (software) print_statistics("its software", *engines.software());
-  engines.for_each_count(print_calls, print_goals);
+  for (const auto& line : lines) node_log().print(line);
   return status;
+}
+
+// Run the node with a command line without the arguments of ROS. Return the exit status.
+template <typename Ros>
+int run(Ros& ros, const System& system, const std::vector<std::string>& given) {
+  constexpr bool is_ros2 = Ros::kVersion == 2;
+  if (parse_arguments(system, is_ros2, given).wants_help) {
+    print_help(std::cout, system, Ros::kArguments, is_ros2);
+    return 0;
+  }
+  if (!ros.start([] { return is_interrupted != 0; })) return 0;
+  std::vector<std::string> words = options_of(ros.parameters(parameter_names()));
+  words.insert(words.end(), given.begin(), given.end());
+  NodeArguments arguments = parse_arguments(system, is_ros2, words);
+  check_complete(system, arguments);
+  std::vector<std::string> names;
+  for (const auto& parameter : system.parameters) names.push_back(parameter.name);
+  arguments.parameters = ros.parameters(names);
+  return serve(ros, system, arguments);
+}
+
+// Report the exception that is being handled. Return the exit status.
+inline int report_fault(const System& system) {
+  const auto say = [&](const std::string& reason) { node_log().say(Level::kError, system.name + "_node: " + reason); };
+  try {
+    throw;
+  } catch (const UsageError& fault) {
+    say(std::string(fault.what()) + "; see --help");
+    return 2;
+  } catch (const std::exception& fault) {
+    say(fault.what());
+    return 1;
+  }
 }
 
 template <typename Ros>
@@ -629,27 +674,16 @@ int run(const System& system, int argc, char** argv) {
   try {
     handle_signals();
     Ros ros(argc, argv, system.name + "_node");
-    const std::vector<std::string> given(argv + 1, argv + argc);
-    constexpr bool is_ros2 = Ros::kVersion == 2;
-    if (parse_arguments(system, is_ros2, given).wants_help) {
-      print_help(std::cout, system, Ros::kArguments, is_ros2);
-      return 0;
+    try {
+      return run(ros, system, std::vector<std::string>(argv + 1, argv + argc));
+    } catch (const std::exception&) {
+      const int status = report_fault(system);
+      // ROS's log gets the fault.
+      ros.flush();
+      return status;
     }
-    if (!ros.start([] { return is_interrupted != 0; })) return 0;
-    std::vector<std::string> words = options_of(ros.parameters(parameter_names()));
-    words.insert(words.end(), given.begin(), given.end());
-    NodeArguments arguments = parse_arguments(system, is_ros2, words);
-    check_complete(system, arguments);
-    std::vector<std::string> names;
-    for (const auto& parameter : system.parameters) names.push_back(parameter.name);
-    arguments.parameters = ros.parameters(names);
-    return serve(ros, system, arguments);
-  } catch (const UsageError& fault) {
-    std::cerr << system.name << "_node: " << fault.what() << "; see --help" << std::endl;
-    return 2;
-  } catch (const std::exception& fault) {
-    std::cerr << system.name << "_node: " << fault.what() << std::endl;
-    return 1;
+  } catch (const std::exception&) {
+    return report_fault(system);
   }
 }
 

@@ -14,7 +14,6 @@
 #include <deque>
 #include <exception>
 #include <functional>
-#include <iostream>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -24,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include <firm/log.hpp>
 #include <firm/transport.hpp>
 
 namespace firm {
@@ -420,7 +420,7 @@ class NodeCalls {
 
   void report(const std::string& text) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (reported_++ < kMostReports) std::cerr << text << std::endl;
+    if (reported_++ < kMostReports) node_log().say(Level::kWarning, text);
   }
 
   const std::vector<Service> services_;

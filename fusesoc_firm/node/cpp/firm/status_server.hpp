@@ -15,7 +15,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
-#include <ostream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -46,11 +45,13 @@ class StatusServer {
   using Access = std::function<Bytes(const Bytes&)>;
 
   // A name that another node has, or that is too long, is reported and not served.
-  StatusServer(const std::vector<std::string>& names, Access access, std::ostream& log) : access_(std::move(access)) {
+  StatusServer(const std::vector<std::string>& names, Access access,
+               const std::function<void(const std::string& line)>& report)
+      : access_(std::move(access)) {
     for (const auto& name : names) {
       Descriptor listener = listen(name);
       if (listener.get() < 0) {
-        log << "'firm status " << name << "' cannot ask this node: " << std::strerror(errno) << std::endl;
+        report("'firm status " + name + "' cannot ask this node: " + std::strerror(errno));
       } else {
         threads_.emplace_back([this, item = std::move(listener)] { serve(item.get()); });
       }

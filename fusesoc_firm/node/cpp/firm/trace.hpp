@@ -14,9 +14,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <ostream>
+#include <string>
+#include <utility>
 
 #include <firm/queues.hpp>
 #include <firm/transport.hpp>
@@ -27,7 +30,8 @@ class Trace {
  public:
   // Without a stream, nothing is written. If the stream fails, such as on a full disk, the trace ends with a line in
   // `log`.
-  explicit Trace(std::ostream* stream, std::ostream* log = nullptr) : stream_(stream), log_(log) {
+  explicit Trace(std::ostream* stream, std::function<void(const std::string&)> log = nullptr)
+      : stream_(stream), log_(std::move(log)) {
     if (stream_) *stream << "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n";
   }
 
@@ -97,11 +101,11 @@ class Trace {
   void end_if_failed() {
     if (stream_.load()->good()) return;
     stream_ = nullptr;
-    if (log_) *log_ << "the trace ends, since it cannot be written" << std::endl;
+    if (log_) log_("the trace ends, since it cannot be written");
   }
 
   std::atomic<std::ostream*> stream_;
-  std::ostream* log_;
+  const std::function<void(const std::string&)> log_;
   std::mutex mutex_;
   std::deque<std::optional<Message>> sent_;  // but not yet taken; nothing for other frames
 };
