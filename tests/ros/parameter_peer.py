@@ -61,13 +61,15 @@ class Peer2:
         from rclpy.parameter_client import AsyncParameterClient
         from std_msgs.msg import Int32
 
-        self._rclpy, self._message, self._parameter = rclpy, Int32, Parameter
+        self._rclpy, self._node, self._message, self._parameter = rclpy, node, Int32, Parameter
         self._answers: Queue[Any] = Queue()
         rclpy.init()
         self._own = rclpy.create_node("peer")
         self._publisher = self._own.create_publisher(Int32, "sub", 10)
         self._own.create_subscription(Int32, "pub", self._answers.put, 10)
+        self._events: Queue[Any] = Queue()
         self._client = AsyncParameterClient(self._own, node)
+        self._client.on_parameter_event(self._keep_event)
         self._thread = threading.Thread(target=self._spin, daemon=True)
         self._thread.start()
         assert self._client.wait_for_services(_SECONDS)
@@ -108,6 +110,25 @@ class Peer2:
         (type_,) = self._done(self._client.get_parameter_types([name])).types
         ranges = [*found.integer_range, *found.floating_point_range]
         return [found.name, found.type, type_, [[each.from_value, each.to_value] for each in ranges]]
+
+    def _keep_event(self, event: Any) -> None:
+        if event.node == self._node:
+            self._events.put(event)
+
+    def event(self) -> Any:
+        """Return the next change of the node: its new, changed and deleted parameters.
+
+        Events about its first values come only to listeners that it has found before.
+        """
+        from rclpy.parameter import parameter_value_to_python
+
+        while not (event := self._events.get(timeout=_SECONDS)).changed_parameters:
+            pass
+        assert 0 <= time.time() - event.stamp.sec < _SECONDS
+        return [
+            {item.name: parameter_value_to_python(item.value) for item in items}
+            for items in (event.new_parameters, event.changed_parameters, event.deleted_parameters)
+        ]
 
     def set_all(self, values: dict[str, Any]) -> str:
         """Set several parameters, all or none; return the reason of a refusal."""

@@ -128,6 +128,28 @@ def test_clients_of_ros_2_find_the_parameters(place: Place, spec: Path, language
 
 
 @LANGUAGES
+def test_clients_of_ros_2_see_each_change(place: Place, spec: Path, language: str) -> None:
+    if place.version == 1:
+        pytest.skip("the master of ROS 1 has no events")
+    with started(place, spec, language, first_values(place, gain=2)):
+        found = steps(
+            place,
+            "/tuning_node" if language == "cpp" else "/tuning",
+            ("set", "block.gain", -4),
+            ("event",),
+            ("set", "block.gain", 101),
+            ("set", "block.offset", 0.25),
+            ("event",),
+            ("set_all", {"block.gain": 5, "block.invert": True}),
+            ("event",),
+        )
+    assert found[1] == [{}, {"block.gain": -4}, {}]
+    assert found[2], "a refused value"
+    assert found[4] == [{}, {"block.offset": 0.25}, {}]
+    assert found[6] == [{}, {"block.gain": 5, "block.invert": True}, {}]
+
+
+@LANGUAGES
 def test_a_first_value_outside_of_the_range_ends_the_node(place: Place, spec: Path, language: str) -> None:
     with started(place, spec, language, first_values(place, gain=101)) as node:
         assert node.process.wait(60) == 1

@@ -146,7 +146,8 @@ class Ros2 {
     if (is_active_) servers_.back()->open();
   }
 
-  // Let clients read and set the parameters of the hardware in every state of the node; both outlive the services.
+  // Let clients read and set the parameters of the hardware, and publish their changes, in every state of the node; both
+  // arguments outlive the services.
   // Throws MiddlewareError.
   void offer(HardwareParameters& parameters, SetParameters set) {
     parameters_ = std::make_unique<ParameterServices>(parameters, std::move(set));
@@ -154,7 +155,8 @@ class Ros2 {
       parameter_servers_.push_back(std::make_unique<RawServer>(node_, service, std::move(handler)));
       parameter_servers_.back()->open();
     };
-    parameters_->open(rcl_node_get_fully_qualified_name(&node_), serve_always);
+    parameters_->open(rcl_node_get_fully_qualified_name(&node_), serve_always,
+                      advertise(own_topic("/parameter_events", "ParameterEvent"), rmw_qos_profile_parameter_events));
   }
 
   // Return a function that calls a service. Throws MiddlewareError.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The services with which clients of ROS 2 list, describe, read and set the parameters of a node (rcl_interfaces), for
-// the parameters of the hardware. Requests and responses are bytes in CDR. C++17.
+// The services with which clients of ROS 2 list, describe, read and set the parameters of a node, and the events about
+// their changes (rcl_interfaces), for the parameters of the hardware. Messages are bytes in CDR. C++17.
 #pragma once
 
 #include <chrono>
@@ -15,6 +15,7 @@
 #include <firm/log.hpp>
 #include <firm/parameters.hpp>
 #include <firm/services.hpp>
+#include <firm/topic.hpp>
 #include <firm/transport.hpp>
 
 namespace firm {
@@ -94,8 +95,12 @@ class ParameterServices {
   ParameterServices(HardwareParameters& parameters, SetParameters set)
       : parameters_(parameters), set_(std::move(set)) {}
 
-  // Serve all; `serve` passes the requests of a service to a handler. The object outlives the services.
-  void open(const std::string& node, const std::function<void(const Service&, CallHandler)>& serve) {
+  // Serve all; `serve` passes the requests of a service to a handler. Publish an event for the values in effect, and one
+  // for each change. The object outlives the services.
+  void open(const std::string& node, const std::function<void(const Service&, CallHandler)>& serve,
+            MessageHandler publish_event) {
+    node_ = node;
+    publish_event_ = std::move(publish_event);
     const auto add = [&](const std::string& name, const std::string& type, Bytes (ParameterServices::*respond)(CdrReader)) {
       Service service{};
       service.name = node + "/" + name;
@@ -116,6 +121,7 @@ class ParameterServices {
     add("get_parameters", "GetParameters", &ParameterServices::get);
     add("set_parameters", "SetParameters", &ParameterServices::set);
     add("set_parameters_atomically", "SetParametersAtomically", &ParameterServices::set_atomically);
+    publish(parameters_.values(), {});
   }
 
  private:
@@ -137,6 +143,25 @@ class ParameterServices {
     std::vector<std::string> found;
     request.skip([&] { found.push_back(request.text()); });
     return found;
+  }
+
+  // Publish an event, a rcl_interfaces/msg/ParameterEvent, with the values in effect of new and of changed parameters.
+  void publish(const HardwareParameters::Values& added, const HardwareParameters::Values& changed) const {
+    CdrWriter event;
+    event.now().text(node_);
+    for (const auto* values : {&added, &changed}) {
+      event.count(values->size());
+      for (const auto& item : *values) {
+        event.text(item.first);
+        write_value(event, item.first);
+      }
+    }
+    event.count(0);  // none is deleted
+    try {
+      publish_event_(event.bytes.data(), event.bytes.size());
+    } catch (const MiddlewareError& error) {
+      node_log().say(Level::kWarning, error.what());
+    }
   }
 
   // A value's numbers, then the strings and arrays, which are empty.
@@ -248,7 +273,9 @@ class ParameterServices {
       if (typed.first != type_of(*parameter)) return "the value is not a " + parameter->type + "; legal: " + parameter->range();
       values[name] = typed.second;
     }
-    return set_(values);
+    const std::string reason = set_(values);
+    if (reason.empty()) publish({}, values);
+    return reason;
   }
 
   static void write_result(CdrWriter& out, const std::string& reason) {
@@ -274,6 +301,8 @@ class ParameterServices {
 
   HardwareParameters& parameters_;
   const SetParameters set_;
+  std::string node_;
+  MessageHandler publish_event_;
 };
 
 }  // namespace firm
