@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, add_spec, command, load
+from fusesoc_firm.cli.common import add_json, add_sources, add_spec, command, load, print_json
 from fusesoc_firm.text.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.system.derived.model import BlockParameter
 
 
 def add_status(commands: Any) -> None:
@@ -31,6 +35,7 @@ def add_status(commands: Any) -> None:
         metavar="SPEC",
         help="the system's specification, for names and to compare the digest; needed if it has 'idBytes: 2'",
     )
+    add_json(status)
     add_sources(status)
     registers = command(
         commands,
@@ -45,26 +50,44 @@ def add_status(commands: Any) -> None:
 
 
 def _print_status(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.status.status import check_digest, read_status, status_text
-    from fusesoc_firm.node.status.status_socket import open_status
+    from fusesoc_firm.node.status.status import (
+        check_digest,
+        parameters_text,
+        read_parameters,
+        read_status,
+        status_data,
+        status_text,
+    )
+    from fusesoc_firm.node.status.status_socket import NodeTransport, open_status
     from fusesoc_firm.node.transport.transport import TransportError
     from fusesoc_firm.system.derived.ids import ONE_BYTE
     from fusesoc_firm.system.system_core import identity
 
     names: list[str] = []
     expected, id_bytes = "", ONE_BYTE
+    known: Iterable[BlockParameter] = ()
     if arguments.system:
         arguments.spec = arguments.system
         loaded = load(arguments, needs_sources=False)
         names = [item.block for item in (*loaded.system.subscribers, *loaded.system.publishers)]
         expected, id_bytes = identity(loaded).digest, loaded.system.id_bytes
+        known = loaded.system.parameters
     try:
         with open_status(arguments.address) as transport:
             if expected:
                 check_digest(transport, expected, loaded.system.name, id_bytes)
-            print(status_text(read_status(transport, id_bytes), names))
+            elif isinstance(transport, NodeTransport):
+                known = transport.parameters()
+            status = read_status(transport, id_bytes)
+            parameters = read_parameters(transport, [*known], id_bytes)
     except TransportError as error:
         fail(str(error))
+    if arguments.json:
+        print_json(status_data(status, names, parameters))
+        return
+    print(status_text(status, names))
+    if parameters:
+        print(parameters_text(parameters))
 
 
 def _write_registers(arguments: argparse.Namespace) -> None:

@@ -138,7 +138,7 @@ def run_node(
             stack.callback(node.close)
             if node.has_status:
                 names = served_names(description.name, address)
-                stack.enter_context(StatusServer(names, node.access_status, log.warn))
+                stack.enter_context(StatusServer(names, node.access_status, log.warn, description.parameters))
             carriers = {}
             for ros in options.versions:
                 carriers[ros] = stack.enter_context(closing(RosCarrier(ros, description, options.ros)))

@@ -105,7 +105,10 @@ int main(int, char** arguments) {
   std::optional<firm::StatusServer> server;
   if (!served.empty()) {
     const auto access = [&](const firm::Bytes& request) { return node.access_status(request, std::chrono::seconds(2)); };
-    server.emplace(std::vector<std::string>{served}, access, report);
+    server.emplace(std::vector<std::string>{served}, access, report,
+                   std::vector<firm::Parameter>{{"block.gain", "int32", -3, -2147483648.0, 2147483647},
+                                                {"block.offset", "float32", 0.5, -1.5, 1e30},
+                                                {"other.invert", "bool", 1, 0, 1}});
     std::cout << "serves" << std::endl;
   }
   int status = -1;

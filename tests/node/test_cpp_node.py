@@ -17,8 +17,9 @@ from uuid import uuid4
 
 import pytest
 
+from fusesoc_firm.node.interface.description import hardware_parameters
 from fusesoc_firm.node.status.status import access
-from fusesoc_firm.node.status.status_socket import open_status
+from fusesoc_firm.node.status.status_socket import NodeTransport, open_status
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.system.status_frames import write_request
 from tests.node.drivers import HERE, Driver, cpp_driver
@@ -26,6 +27,12 @@ from tests.node.strangers import reply_to_stranger
 from tests.seeds import seeded
 
 SEED = seeded(20261121)
+# Those of the driver.
+PARAMETERS = hardware_parameters(
+    ("block", "gain", "int32", -3, -(2**31), 2**31 - 1),
+    ("block", "offset", "float32", 0.5, -1.5, 1e30),
+    ("other", "invert", "bool", True, 0, 1),
+)
 SIMULATOR = f"exec {shlex.quote(sys.executable)} {shlex.quote(str(HERE / 'model_simulator.py'))}"
 
 
@@ -152,6 +159,8 @@ def test_another_process_asks_for_the_status(tmp_path: Path, sanitizers: str) ->
             for address in range(0, 400, 4):
                 word = source.randrange(2**32)
                 assert access(transport, write_request(address, word)) == word
+            assert isinstance(transport, NodeTransport)
+            assert [*transport.parameters()] == [*PARAMETERS]
             transport.send(b"another frame")
             with pytest.raises(TransportError, match="not a request of the status"):
                 transport.receive(20)

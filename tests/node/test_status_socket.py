@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import threading
 from collections.abc import Iterator
@@ -17,11 +18,11 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.engine.queues import Overflow
 from fusesoc_firm.node.engine.trace import Trace
-from fusesoc_firm.node.interface.description import NodeDescription, describe
+from fusesoc_firm.node.interface.description import NodeDescription, describe, hardware_parameters
 from fusesoc_firm.node.node import NodeSettings
 from fusesoc_firm.node.status import status_socket
 from fusesoc_firm.node.status.status import read_status, read_word, write_word
-from fusesoc_firm.node.status.status_socket import StatusServer, open_status, served_names
+from fusesoc_firm.node.status.status_socket import NodeTransport, StatusServer, open_status, served_names
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.system.derived.status import STATUS_ID
 from fusesoc_firm.system.hardware.status import status_map
@@ -118,6 +119,75 @@ def test_the_command_asks_the_node(served: Served, capsys: pytest.CaptureFixture
     assert "2 of code 9" in printed
     assert main(["status", "node:nobody_has_this_name"]) == 1
     assert "no node of the system 'nobody_has_this_name'" in capsys.readouterr().err
+
+
+def test_the_command_shows_the_parameters_that_the_node_knows(
+    description: NodeDescription, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The hardware has the values; the first block holds a message, so a wanted value is not in effect yet."""
+    parameters = hardware_parameters(
+        ("block", "gain", "int8", 1, -4, 100),
+        ("block", "offset", "float32", 0.0, -1.5, 1e10),
+        ("other", "invert", "bool", False, 0, 1),
+    )
+    gain, offset, invert = ({"wanted": 0xFFFFFFFD, "value": 5}, {"value": 0x3FA00000}, {"wanted": 1, "value": 1})
+    words = {0x100: gain["wanted"], 0x104: gain["value"], 0x108: offset["value"], 0x10C: offset["value"]}
+    words |= {0x110: invert["wanted"], 0x114: invert["value"]}
+
+    def access(request: bytes) -> bytes:
+        address, _ = answered(request) or (0, 0)
+        resets = sum(field.reset << field.low for field in MAP[address].fields) if address in MAP else 0
+        return status_answer(address, words.get(address, resets))
+
+    name = f"node:{description.name}"
+    with StatusServer([name], access, print, parameters):
+        assert main(["status", name]) == 0
+        printed = capsys.readouterr().out
+        assert printed.splitlines()[-4:] == [
+            "parameter     value             type     range",
+            "block.gain    5 (-3 is wanted)  int8     -4 to 100",
+            "block.offset  1.25              float32  -1.5 to 1e+10",
+            "other.invert  true              bool     true, false",
+        ]
+        assert main(["status", name, "--json"]) == 0
+        data = json.loads(capsys.readouterr().out)
+    assert [(item["name"], item["type"], item["value"], item["wanted"]) for item in data["parameters"]] == [
+        ("block.gain", "int8", 5, -3),
+        ("block.offset", "float32", 1.25, 1.25),
+        ("other.invert", "bool", True, True),
+    ]
+    assert [(item["default"], item["range"]) for item in data["parameters"]] == [
+        (1, [-4, 100]),
+        (0.0, [-1.5, 1e10]),
+        (False, [0, 1]),
+    ]
+
+
+def test_the_status_of_a_node_is_json(served: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["status", served.name, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["last_fault"] == {"code": 9, "channel": "publisher[0]"}
+    assert (data["id_errors"], data["link_errors"], data["lost"]) == (3, 0, 0)
+    frames = {item["name"]: (item["frames"], item["faults"]) for item in data["channels"]}
+    assert frames == {
+        "subscriber[0]": (0, {}),
+        "subscriber[1]": (17, {}),
+        "publisher[0]": (0, {"9": 2}),
+        "publisher[1]": (0, {}),
+    }
+    assert (data["digest"], data["endpoints"], data["parameters"]) == ("0" * 32, [], [])
+
+
+def test_a_node_without_descriptions_of_parameters_is_asked(
+    description: NodeDescription, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of an earlier version replies that this is not a request of the status."""
+    made = Served(description)
+    monkeypatch.setattr(made.server, "_reply", lambda _: b"the frame is not a request of the status")
+    with open_status(made.name) as transport:
+        assert isinstance(transport, NodeTransport)
+        assert [*transport.parameters()] == []
+    made.close()
 
 
 def test_hardware_that_does_not_answer_is_reported(served: Served) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +30,25 @@ def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 @pytest.fixture(scope="module")
 def spec(place: Place) -> Path:
-    path = specification(place.folder)
+    return written(place, place.folder)
+
+
+@pytest.fixture(scope="module")
+def own_spec(place: Place) -> Path:
+    """A system whose name no other node on the computer has, as `firm status` finds nodes by their names."""
+    folder = place.folder / "own"
+    folder.mkdir()
+    path = written(place, folder).rename(folder / "own.yaml")
+    path.write_text(path.read_text().replace("name: tuning", f"name: {own_name()}"))
+    return path
+
+
+def own_name() -> str:
+    return f"tuning_{os.getpid()}"
+
+
+def written(place: Place, folder: Path) -> Path:
+    path = specification(folder)
     if place.version == 1:
         path.write_text(path.read_text().replace("middleware: ROS2", "middleware: ROS"))
     return path
@@ -60,7 +79,7 @@ def started(place: Place, spec: Path, language: str, values: list[str]) -> NodeP
         return Node(place.ros, place.program(spec), transport, *values)
     command = ["live", str(spec)]
     if language == "python":
-        package = place.folder / "python_package"
+        package = place.folder / f"{spec.stem}_python_package"
         assert main(["system", "node", str(spec), "--language", "python", "-o", str(package)]) == 0
         command = [str(next(package.rglob("*_node.py")))]
     return LiveNode(place.ros, place.folder / "node.log", [*command, "--transport", transport], *values)
@@ -164,3 +183,21 @@ def test_a_refused_value_is_a_warning_in_the_log(place: Place, spec: Path, langu
         line = peer.wait_for(" is not set: ")
         assert line["level"] == logging.WARNING and "gain" in line["text"]
         assert node.said().count(line["text"]) == 1
+
+
+@LANGUAGES
+def test_firm_status_shows_the_values_in_effect(
+    place: Place, own_spec: Path, language: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with started(place, own_spec, language, first_values(place, gain=2, offset=0.25, invert=True)) as node:
+        name = f"/{own_name()}_node" if language == "cpp" else f"/{own_name()}"
+        assert steps(place, name, ("set", "block.gain", -4)) == [""]
+        for words in ([], ["--system", str(own_spec)]):
+            capsys.readouterr()
+            assert main(["status", f"node:{own_name()}", "--json", *words]) == 0, node.said()
+            found = json.loads(capsys.readouterr().out)["parameters"]
+            assert [(item["name"], item["value"], item["range"]) for item in found] == [
+                ("block.gain", -4, [-4, 100]),
+                ("block.offset", 0.25, [-1.5, 1e10]),
+                ("block.invert", True, [0, 1]),
+            ]

@@ -10,7 +10,7 @@ ids must be known: `id_bytes`.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, islice
@@ -19,6 +19,8 @@ from fusesoc_firm.frame.faults import Fault
 from fusesoc_firm.frame.model import ID_BYTES
 from fusesoc_firm.node.status.status_exchange import NO_ANSWER
 from fusesoc_firm.node.transport.transport import Transport, TransportError
+from fusesoc_firm.system.derived.model import BlockParameter
+from fusesoc_firm.system.hardware.parameters import value_address, wanted_address
 from fusesoc_firm.system.hardware.registers import Register
 from fusesoc_firm.system.hardware.status import (
     DIGEST_ADDRESS,
@@ -40,6 +42,7 @@ _VERSION = 1
 _SHAPE_ADDRESS, _FEATURES_ADDRESS = 0x04, 0x28
 _KNOWN_PARTS = sum(part.value for part in Part)
 _EVENTS = {"id_errors": "unknown ids", "link_errors": "link errors", "lost": "uncounted faults"}
+_WORDS = ("signature", "frames", "longest_wait", "stamp")
 _CHANNEL_WORDS = {"frames": "frames", "longest_wait": "longest wait in cycles"}
 # The highest word first.
 _DIGEST_ADDRESSES = tuple(DIGEST_ADDRESS + 4 * number for number in reversed(range(DIGEST_WORDS)))
@@ -168,15 +171,99 @@ class StatusWatch:
         return [item.name.removesuffix(suffix) for item in self._registers if item.name.endswith(suffix)]
 
 
+@dataclass(frozen=True)
+class ParameterState:
+    """A parameter with its value in effect at the accelerator, and the one that software wants."""
+
+    item: BlockParameter
+    value: float
+    wanted: float
+
+
+def read_parameters(
+    transport: Transport, parameters: Iterable[BlockParameter], id_bytes: int = ID_BYTES
+) -> list[ParameterState]:
+    """Read the values of parameters, whose names and types the hardware does not tell. May raise `TransportError`."""
+
+    def value(item: BlockParameter, address: int) -> float:
+        return item.parameter.value(read_word(transport, address, id_bytes))
+
+    return [
+        ParameterState(item, value(item, value_address(item.number)), value(item, wanted_address(item.number)))
+        for item in parameters
+    ]
+
+
+def parameters_text(states: Sequence[ParameterState]) -> str:
+    """Return a table of parameters."""
+    rows = [("parameter", "value", "type", "range")]
+    for state in states:
+        parameter = state.item.parameter
+        value = _value_text(state.value)
+        if state.wanted != state.value:
+            value += f" ({_value_text(state.wanted)} is wanted)"
+        rows.append((state.item.name, value, parameter.type.name, parameter.range))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = (map(str.ljust, row, widths) for row in rows)
+    return "\n".join("  ".join(row).rstrip() for row in padded)
+
+
+def _value_text(value: float) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.9g}"
+
+
+def status_data(
+    status: Status, names: Sequence[str] = (), parameters: Sequence[ParameterState] = ()
+) -> dict[str, object]:
+    """Return the status as data for JSON; `names` as in `status_text`."""
+    shown = _shown_channels(status, names)
+    own = {*_EVENTS, "cycles", *network_words()}
+    code, channel = (status.field("last_fault", name) for name in ("code", "channel"))
+    return {
+        "digest": status.digest,
+        **{name: word for name, word in status.words.items() if name in own},
+        "last_fault": {"code": code, "channel": [*shown.values()][channel]} if code else None,
+        "channels": [
+            {
+                "name": name,
+                **{word: status.words[f"{channel}.{word}"] for word in _WORDS if f"{channel}.{word}" in status.words},
+                "faults": {str(fault.value): count for fault, count in _counts(status, channel).items()},
+            }
+            for channel, name in shown.items()
+        ],
+        "endpoints": [
+            {word: status.words[endpoint_register(number, word)] for word in ENDPOINT_WORDS}
+            for number in range(status.words.get("exchange", 0))
+        ],
+        "parameters": [
+            {
+                "name": state.item.name,
+                "type": state.item.parameter.type.name,
+                "value": state.value,
+                "wanted": state.wanted,
+                "default": state.item.parameter.default,
+                "range": [state.item.parameter.least, state.item.parameter.most],
+            }
+            for state in parameters
+        ],
+    }
+
+
+def _shown_channels(status: Status, names: Sequence[str]) -> dict[str, str]:
+    """Return the names to show by channel."""
+    subscribers, publishers = (status.field("shape", name) for name in ("subscribers", "publishers"))
+    channels = [f"subscriber[{number}]" for number in range(subscribers)]
+    channels += [f"publisher[{number}]" for number in range(publishers)]
+    return dict(zip(channels, names or channels, strict=True))
+
+
 def status_text(status: Status, names: Sequence[str] = ()) -> str:
     """Return the status as text, with the texts of the counted codes.
 
     `names` are the channels' blocks, the subscribers first.
     """
-    subscribers, publishers = (status.field("shape", name) for name in ("subscribers", "publishers"))
-    channels = [f"subscriber[{number}]" for number in range(subscribers)]
-    channels += [f"publisher[{number}]" for number in range(publishers)]
-    shown = dict(zip(channels, names or channels, strict=True))
+    shown = _shown_channels(status, names)
+    channels = [*shown]
     width = max(map(len, shown.values()))
     lines = [f"digest {status.digest}", _events(status, shown, channels), *_network(status)]
     if status.has_time_stamps:

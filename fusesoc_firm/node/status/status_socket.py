@@ -8,24 +8,30 @@
 
 The sockets are abstract sockets of Linux, so that a killed node leaves no files. They are named after the node's system
 (`node:robot`) and after the device of its transport. A packet is a request; the reply is the answer of the hardware, or
-the reason of a failure as text. Both sides refuse peers of other users except root; root itself may ask any node.
+the reason of a failure as text. The request `parameter 0` is for the node itself: it replies with a parameter of the
+hardware as JSON (block, name, type, default, least and most value), or with `null` after the last one. Both sides
+refuse peers of other users except root; root itself may ask any node.
 `cpp/firm/status_server.hpp` is the C++ version of the server.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import select
 import socket
 import struct
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from itertools import count
 
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT
 from fusesoc_firm.node.transport.open_transport import device_of, open_transport
 from fusesoc_firm.node.transport.status_registers import AXI, open_registers_at
 from fusesoc_firm.node.transport.transport import Burst, Closing, Transport, TransportError
 from fusesoc_firm.node.transport.udp import UDP, UdpStatus
+from fusesoc_firm.system.derived.model import BlockParameter, Parameter
 from fusesoc_firm.system.status_frames import answered
 
 NODE = "node"
@@ -33,6 +39,8 @@ _PREFIX = b"\0firm status "
 _LONGEST_NAME = 90
 _LONGEST_PACKET = 1000
 _WAITING_PEERS = 8
+# A request for the description of a parameter begins with this word; no frame of the status does.
+_PARAMETER = b"parameter "
 # A peer that is silent for this time must reconnect.
 _SILENCE_SECONDS = 5.0
 
@@ -49,8 +57,15 @@ class StatusServer(Closing):
     A name that is too long or in use by another node is reported and not served.
     """
 
-    def __init__(self, names: Sequence[str], access: Callable[[bytes], bytes], report: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        access: Callable[[bytes], bytes],
+        report: Callable[[str], None],
+        parameters: Sequence[BlockParameter] = (),
+    ) -> None:
         self._access = access
+        self._parameters = parameters
         self._listeners = [item for name in names if (item := _listener(name, report))]
         self._stopped, self._stop = socket.socketpair()
         self._thread = threading.Thread(target=self._serve, name="status", daemon=True)
@@ -77,12 +92,26 @@ class StatusServer(Closing):
             request = peer.recv(_LONGEST_PACKET)
             if not request:
                 return
-            try:
-                reply = self._access(request)
-            except TransportError as error:
-                reply = str(error).encode()[:_LONGEST_PACKET]
+            reply = self._reply(request)
             # The server does not wait for a peer that does not read its replies.
             peer.send(reply, socket.MSG_DONTWAIT)
+
+    def _reply(self, request: bytes) -> bytes:
+        number = request.removeprefix(_PARAMETER)
+        if number != request and number.isdigit():
+            return _parameter_text(self._parameters[int(number) :])
+        try:
+            return self._access(request)
+        except TransportError as error:
+            return str(error).encode()[:_LONGEST_PACKET]
+
+
+def _parameter_text(parameters: Sequence[BlockParameter]) -> bytes:
+    """Return the first of the parameters as JSON."""
+    if not parameters:
+        return b"null"
+    item, found = parameters[0], parameters[0].parameter
+    return json.dumps([item.block, found.name, found.type.name, found.default, found.least, found.most]).encode()
 
 
 class NodeTransport(Closing):
@@ -100,6 +129,29 @@ class NodeTransport(Closing):
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the answer, or None after `timeout` seconds. May raise `TransportError`."""
+        reply = self._reply(timeout)
+        if reply is None:
+            return None
+        if answered(reply) is None:
+            raise TransportError(reply.decode(errors="replace"))
+        return Burst(reply)
+
+    def parameters(self) -> Iterator[BlockParameter]:
+        """Yield the parameters of the hardware that the node knows. May raise `TransportError`."""
+        for number in count():
+            self.send(_PARAMETER + str(number).encode())
+            reply = self._reply(_SILENCE_SECONDS)
+            try:
+                found = json.loads(reply or b"null")
+            except ValueError:
+                # A node of an earlier version takes it for a request to the hardware.
+                return
+            if found is None:
+                return
+            block, name, type_, *values = found
+            yield BlockParameter(number, block, Parameter(name, INTEGER_AND_FLOAT[type_], *values))
+
+    def _reply(self, timeout: float | None) -> bytes | None:
         try:
             self._peer.settimeout(timeout)
             reply = self._peer.recv(_LONGEST_PACKET)
@@ -107,9 +159,9 @@ class NodeTransport(Closing):
             return None
         except OSError as error:
             raise TransportError(f"the node has ended: {error.strerror}") from None
-        if answered(reply) is None:
-            raise TransportError(reply.decode(errors="replace") or "the node has ended")
-        return Burst(reply)
+        if not reply:
+            raise TransportError("the node has ended")
+        return reply
 
     def is_ready(self) -> bool:
         """Return False, since the node's frames are unknown."""

@@ -603,7 +603,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   if (engines.has_status()) {
     const auto access = [&](const Bytes& request) { return engines.access_status(request, std::chrono::seconds(5)); };
     server.emplace(served_names(system.name, arguments.transport), access,
-                   [](const std::string& line) { node_log().say(Level::kWarning, line); });
+                   [](const std::string& line) { node_log().say(Level::kWarning, line); }, system.parameters);
     watch.emplace([&](std::uint32_t address) { return word_at(engines, address); }, system.channels);
   }
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };

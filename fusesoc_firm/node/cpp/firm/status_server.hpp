@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -22,6 +23,7 @@
 
 #include <firm/descriptor.hpp>
 #include <firm/open_transport.hpp>
+#include <firm/parameters.hpp>
 #include <firm/transport.hpp>
 
 namespace firm {
@@ -46,8 +48,8 @@ class StatusServer {
 
   // A name that another node has, or that is too long, is reported and not served.
   StatusServer(const std::vector<std::string>& names, Access access,
-               const std::function<void(const std::string& line)>& report)
-      : access_(std::move(access)) {
+               const std::function<void(const std::string& line)>& report, std::vector<Parameter> parameters = {})
+      : access_(std::move(access)), parameters_(std::move(parameters)) {
     for (const auto& name : names) {
       Descriptor listener = listen(name);
       if (listener.get() < 0) {
@@ -67,6 +69,8 @@ class StatusServer {
 
  private:
   static constexpr char kPrefix[] = "firm status ";
+  // A request for the description of a parameter begins with this word; no frame of the status does.
+  static constexpr char kParameter[] = "parameter ";
   static constexpr std::size_t kLongestName = 90;
   static constexpr std::size_t kLongestPacket = 1000;
   static constexpr int kWaitingPeers = 8;
@@ -121,15 +125,33 @@ class StatusServer {
   }
 
   Bytes reply_to(const Bytes& request) const {
+    const std::string text(request.begin(), request.end());
+    if (text.rfind(kParameter, 0) == 0) return bytes_of(parameter_text(text.substr(sizeof kParameter - 1)));
     try {
       return access_(request);
     } catch (const TransportError& error) {
-      const std::string text = error.what();
-      return Bytes(text.begin(), text.end());
+      return bytes_of(error.what());
     }
   }
 
+  static Bytes bytes_of(const std::string& text) { return Bytes(text.begin(), text.end()); }
+
+  // Return the parameter with a number as JSON, or `null` after the last one.
+  std::string parameter_text(const std::string& digits) const {
+    std::size_t number = parameters_.size();
+    if (!(std::istringstream(digits) >> number) || number >= parameters_.size()) return "null";
+    const Parameter& found = parameters_[number];
+    // The name of a block has no point.
+    const std::size_t point = found.name.find('.');
+    std::ostringstream text;
+    text.precision(17);
+    text << "[\"" << found.name.substr(0, point) << "\", \"" << found.name.substr(point + 1) << "\", \"" << found.type
+         << "\", " << found.initial << ", " << found.least << ", " << found.most << "]";
+    return text.str();
+  }
+
   const Access access_;
+  const std::vector<Parameter> parameters_;
   Waiter waiter_;
   std::vector<std::thread> threads_;
 };
