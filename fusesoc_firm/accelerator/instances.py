@@ -6,7 +6,7 @@ Each is an entity in the VHDL of a core, which the netlist provides as a module,
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -92,8 +92,7 @@ class Instances:
             if not (port := ports.get(name)):
                 faults.error(f"'{unit.name}' has no port '{name}'", _named(name, source), _legal(name, ports))
             elif bits and port.bits is not None and len(bits) != port.bits:
-                parameters = ", ".join(entity.generics)
-                hint = f"the parameters {parameters} select the size" if parameters else ""
+                hint = size_hint("parameters", entity, name, cell["parameters"])
                 message = f"port '{name}' of '{unit.name}' has {port.bits} bits here, and is connected to {len(bits)}"
                 faults.error(message, _named(name, source), hint)
         # In the netlist, an input has no default value.
@@ -111,6 +110,21 @@ class Instances:
             message = f"there is no module '{kind}' in the sources and in the VHDL of other cores"
             near = closest(kind, self._entities)
             faults.error(message, source, f"did you mean '{near}'?" if near else "add its file to 'sources'")
+
+
+def size_hint(word: str, entity: Entity, port: str, given: Collection[str] = ()) -> str:
+    """Return a hint about the size of a port: the generics that select it, called `word`.
+
+    If all of them are `given`, what is connected may be wrong as well.
+    """
+    names = entity.sizes(port)
+    if not names:
+        return ""
+    listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    first = "connect as many bits, or change the" if {*names} <= {*given} else "select the size by the"
+    floats = [[name.endswith(end) for name in names] for end in ("EXPONENT_BITS", "MANTISSA_BITS")]
+    values = ": 8 and 23 for float32, 11 and 52 for float64" if floats == [[True, False], [False, True]] else ""
+    return f"{first} {word} {listed}{values}"
 
 
 def _compare_names(module: Mapping[str, Any], cell: Mapping[str, Any], source: SourceRef, faults: Diagnostics) -> None:

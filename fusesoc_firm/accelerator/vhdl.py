@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
+from fusesoc_firm.accelerator.instances import size_hint
 from fusesoc_firm.accelerator.sources import Fault, report_sources
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
 from fusesoc_firm.accelerator.vhdl_hints import hint, is_at_end, is_generate, is_syntax, is_unanalysed, missing_clause
@@ -44,6 +45,7 @@ _OUT_OF_BOUNDS = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):.*out 
 _LATCH = re.compile(r"^.*latch infered for net .*(?= \(use --latches\))", re.MULTILINE)
 _PLACED = re.compile(r"(?P<file>.+?):(?P<line>\d+):(?P<column>\d+):(?: ?error:)? ?(?P<text>.+)")
 _INSTANCE = re.compile(r"(\w+)\s*:\s*(?:entity\s+)?(?:\w+\s*\.\s*)?(\w+)\s+(?:generic|port)\s+map", re.IGNORECASE)
+_FORMAL = re.compile(r"(\w+)\s*=>")
 _MISSING_UNIT = re.compile(
     r"unit [\"'](?P<unit>\w+)[\"'] not found in library [\"'](?P<of>\w+)|"
     r"cannot find resource library [\"'](?P<library>\w+)"
@@ -197,7 +199,7 @@ class VhdlReader:
                 source = place(path, int(match["line"]), int(match["column"]))
                 if match.re is _LENGTH:
                     message = f"{match['found']} bits, but {match['needed']} are needed here"
-                    faults.error(message, source, self._generics_hint(path, int(match["line"])))
+                    faults.error(message, source, self._size_hint(path, source))
                 else:
                     cure = "compare the ranges: a slice is value(7 downto 0), and resize(value, 32) is in numeric_std"
                     faults.error("the value does not have as many bits as its target", source, cure)
@@ -216,11 +218,11 @@ class VhdlReader:
             if (path := Path(match["file"])) in paths:
                 faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), cure)
 
-    def _generics_hint(self, path: Path, line: int) -> str:
-        """Return a hint if the last instance above a line is of an entity with generics in another core."""
-        label, entity = self._instance(path, line)
-        generics = ", ".join(entity.generics) if entity else ""
-        return f"the generics of '{label}' select the size: {generics} of {entity.name}" if entity and generics else ""
+    def _size_hint(self, path: Path, source: SourceRef) -> str:
+        """Return a hint if a place is in the port map of an entity in another core, whose generics select the size."""
+        label, entity = self._instance(path, source.line)
+        formals = _FORMAL.findall(source.text[: source.column])
+        return size_hint(f"generics of '{label}',", entity, formals[-1]) if entity and formals else ""
 
     def _instance(self, path: Path, line: int) -> tuple[str, Entity | None]:
         """Return the label of the last instance above a line, and its entity if that is in another core."""

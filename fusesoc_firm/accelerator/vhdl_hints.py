@@ -20,6 +20,9 @@ _GENERATE = re.compile(
 _AT_END = re.compile(r"unexpected end of file|.*instead of end of file")
 _UNANALYSED = re.compile(r"entity [\"']\w+[\"'] was not analysed")
 _UNDECLARED = re.compile(r"no declaration for [\"'](\w+)[\"']")
+_NOT_A_VECTOR = re.compile(r"can't match [\"'](\w+)[\"'] with type array type")
+# The declaration of a bit.
+_A_BIT = r"\b{}\b[^:;]*:\s*(?:in|out|inout|buffer)?\s*std_u?logic\b"
 _DECLARED = re.compile(
     r"\b(?:signal|variable|constant|type|subtype|function|procedure|entity|component)\s+(\w+)|(\w+)(?=\s*(?:,\s*\w+\s*)*:)",
     re.IGNORECASE,
@@ -117,6 +120,8 @@ def hint(text: str, lines: Sequence[str], formals: Sequence[str] = ()) -> str:
     if found := _UNDECLARED.match(text):
         near = closest(found[1], formals or set(_declared(lines)))
         return f"did you mean '{near}'?" if near else f"legal here: {', '.join(formals)}" if formals else ""
+    if (found := _NOT_A_VECTOR.match(text)) and re.search(_A_BIT.format(found[1]), "\n".join(lines), re.IGNORECASE):
+        return f"'{found[1]}' is one bit: write target(0) <= {found[1]}, or (others => {found[1]}) for all bits"
     if is_unanalysed(text):
         names = re.findall(r"^\s*entity\s+(\w+)\s+is\b", "\n".join(lines), re.IGNORECASE | re.MULTILINE)
         return f"the entity in this file is '{names[-1]}'" if names else ""

@@ -91,6 +91,12 @@ class Entity:
         """The names of the generics and ports, in their order."""
         return [word for names in _DECLARED.findall(self.interface) for word in _WORDS.findall(names)]
 
+    def sizes(self, port: str) -> Sequence[str]:
+        """Return the generics that the declared type of a port names, in their order."""
+        declared = re.search(rf"\b{re.escape(port)}\b[^:;()]*:([^;]*)", self.interface, re.IGNORECASE)
+        words = {word.lower() for word in _WORDS.findall(declared[1])} if declared else set()
+        return [name for name in self.generics if name.lower() in words]
+
     def spelt(self, port: str) -> str:
         """Return the name of a port as spelt in the source, since the netlist does not preserve the case."""
         return next((word for word in _WORDS.findall(self.interface) if word.lower() == port.lower()), port)

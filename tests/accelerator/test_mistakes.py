@@ -396,7 +396,17 @@ _PORTS = (
         (
             f"firm_float_multiply u ({_PORTS});",
             "'in_a' of 'firm_float_multiply' has 64 bits here, and is",
-            "MANTISSA_BITS",
+            "select the size by the parameters EXPONENT_BITS and MANTISSA_BITS: 8 and 23 for float32, 11 and 52 for",
+        ),
+        (
+            f"firm_float_multiply {_PARAMETERS} u ({_PORTS.replace('in_width', 'in_width[15:0]')});",
+            "'in_b' of 'firm_float_multiply' has 32 bits here, and is connected to 16",
+            "connect as many bits, or change the parameters EXPONENT_BITS and MANTISSA_BITS: 8",
+        ),
+        (
+            "firm_fixed_to_float #(.WIDTH(16)) u (.clk(clk), .rst_n(rst_n), .in_number(in_step));",
+            "'in_number' of 'firm_fixed_to_float' has 16 bits here",
+            "connect as many bits, or change the parameters WIDTH",
         ),
         (
             f"firm_float_multiply {_PARAMETERS.replace('BITS', 'BIT', 1)} u ({_PORTS});",
@@ -489,8 +499,8 @@ def test_a_float_of_the_wrong_size_in_vhdl() -> None:
     assert "32 bits, but 64 are needed here" in fault.message
     assert fault.source
     assert "in_a => in_step" in fault.source.text
-    assert "EXPONENT_BITS, MANTISSA_BITS" in fault.hint
-    assert fault.hint.endswith(" of firm_float_multiply")
+    wanted = "EXPONENT_BITS and MANTISSA_BITS: 8 and 23 for float32, 11 and 52 for float64"
+    assert fault.hint == f"select the size by the generics of 'u_gain', {wanted}"
 
 
 @pytest.mark.parametrize(
@@ -509,6 +519,11 @@ def test_an_unknown_name_of_an_instance(part: str, hint: str) -> None:
     new = f"library firm;\narchitecture rtl of img is\nbegin\n  u : entity firm.firm_float_{part};\n"
     found = diagnostics("vhdl", "architecture rtl of img is", f"{new}end;\narchitecture other of img is", libraries)
     assert any(item.hint.startswith(hint) for item in found), [str(item) for item in found]
+
+
+def test_a_bit_for_a_vector() -> None:
+    found = diagnostics("vhdl", "  out_segment_valid <= (others => is_there);", "  out_segment_valid <= is_there;")
+    assert found[0].hint == "'is_there' is one bit: write target(0) <= is_there, or (others => is_there) for all bits"
 
 
 def test_the_library_of_the_arithmetic_is_named() -> None:

@@ -37,14 +37,24 @@ def link_of(
             project.interconnect.source,
             "a byte link does not mark the end of a burst; use a non-preemptive scheduler or 'axi_stream'",
         )
-    longest = _longest(subscribers)
-    if longest > _MOST_BYTES:
-        faults.error(
-            f"interconnect '{kind.value}' cannot hold a frame of {longest} bytes",
-            project.interconnect.source,
-            f"a link holds whole frames from the host; legal here: messages of at most {_MOST_BYTES} bytes",
-        )
-    return Link(kind, _clock_hz(project, clock, faults), longest)
+    known = list(subscribers)
+    for item in known:
+        _check_length(item, project, faults)
+    return Link(kind, _clock_hz(project, clock, faults), _longest(known))
+
+
+def _check_length(converter: Converter, project: Project, faults: Diagnostics) -> None:
+    """Note a converter whose frames are too long for a link."""
+    longest = longest_payload_of(converter)
+    if longest <= _MOST_BYTES:
+        return
+    limit = f"a link holds whole frames from the host, of at most {_MOST_BYTES} bytes"
+    faults.error(
+        f"interconnect '{project.interconnect}' cannot hold a frame of {longest} bytes, the longest of "
+        f"'{converter.block}'",
+        project.interconnect.source,
+        f"{limit}: set 'maxLength' of '{converter.block}'" if converter.max_length else limit,
+    )
 
 
 def may_be_linked(system: DerivedSystem) -> bool:
