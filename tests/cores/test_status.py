@@ -11,6 +11,7 @@ from fusesoc_firm.system.hardware.registers import Kind, Register, registers_con
 from fusesoc_firm.system.hardware.status import REGISTERS_TEMPLATE, Features, Part, status_map
 from fusesoc_firm.text.render import render
 from tests.hdl.ghdl import Library, core_files
+from tests.hdl.verilog import netlist
 from tests.recall import RunResult
 
 BENCH = "status_bench"
@@ -223,3 +224,10 @@ def test_too_many_channels_are_named(library: Library) -> None:
 @pytest.mark.parametrize("entity", ["firm_status_tree_counters", "firm_status_waits", "firm_status_faults"])
 def test_the_parts_beside_a_tree_are_latch_free(library: Library, entity: str) -> None:
     assert library.latches(entity, {}) == []
+
+
+@pytest.mark.parametrize("sources", [1, 3])
+def test_waits_of_any_number_of_sources_have_a_netlist(tmp_path: Path, sources: int) -> None:
+    """Each bit has an assignment: GHDL drops others with a warning, which ends the translation."""
+    files = core_files("axis/package", "axis/axis", "sched/package", "status/status")
+    assert netlist("firm.firm_status_waits", tmp_path, [], files, SOURCES=sources).exists()

@@ -76,6 +76,8 @@ begin
   note_waits : process (clk)
   begin
     if rising_edge(clk) then
+      -- Of places without a source, too, so that each bit has an assignment.
+      waited_r <= (others => '0');
       for number in 0 to SOURCES-1 loop
         waited_r(number) <= waits(number) and (visited(number) or waited_r(number));
       end loop;
