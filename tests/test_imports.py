@@ -35,16 +35,12 @@ ALLOWED: dict[str, str] = {
     "node": "accelerator core frame message system text tools",
     "runs": "accelerator converter core frame message node system text tools",
     "builds": "converter core fabric message node runs system text tools",
-    "component": "builds core netlist system text tools",
-    "ip_xact": "component system text",
-    "wrapper": "component text",
     "api": "accelerator builds frame message node runs system text",
-    "pynq": "api frame message node system text",
+    "export": "api builds core frame message netlist node system text tools",
     "exploration": "accelerator compiler core frame netlist noc node runs system text tools",
     "studio": "accelerator builds converter core exploration frame message node runs scheduling system text tools",
     "cli": (
-        "accelerator builds component converter exploration fabric ip_xact message node pynq runs scheduling studio "
-        "system text tools wrapper"
+        "accelerator builds converter exploration export fabric message node runs scheduling studio system text tools"
     ),
 }
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
@@ -53,6 +49,7 @@ STOREYS = {
     "scheduling": (".", "models", "evaluation"),
     "runs": ("bags", "simulation", "replay", "emulation", "verify", "."),
     "builds": ("store", "step", "setup", "call", "."),
+    "export": ("component", "ip_xact", "wrapper", "pynq", "."),
 }
 
 

@@ -38,8 +38,8 @@ def add_ip_xact(commands: Any) -> None:
 
 
 def _package(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.ip_xact.package import write_package
-    from fusesoc_firm.ip_xact.writer import STANDARDS, vlnv
+    from fusesoc_firm.export.ip_xact.package import write_package
+    from fusesoc_firm.export.ip_xact.writer import STANDARDS, vlnv
 
     made = packaged(arguments, arguments.view)
     write_package(made, arguments.standard, arguments.output)

@@ -10,7 +10,7 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import make_folder, shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.component.package import Package
+    from fusesoc_firm.export.component.package import Package
 
 
 def add_target(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +30,8 @@ def packaged(arguments: argparse.Namespace, view: str) -> Package:
     from fusesoc_firm.cli.failed_build import print_errors
     from fusesoc_firm.cli.here import core_named
     from fusesoc_firm.cli.progress import Progress
-    from fusesoc_firm.component.design import plan_target
-    from fusesoc_firm.component.package import package
+    from fusesoc_firm.export.component.design import plan_target
+    from fusesoc_firm.export.component.package import package
 
     core, folder = core_named(arguments.system)
     make_folder(arguments.output)

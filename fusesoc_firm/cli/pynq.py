@@ -31,7 +31,7 @@ def add_pynq(commands: Any) -> None:
 
 
 def _write_package(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pynq.package import built_files, overlay_files, overlay_name
+    from fusesoc_firm.export.pynq.package import built_files, overlay_files, overlay_name
     from fusesoc_firm.text.outputs import write
 
     loaded, board = load_on_board(arguments)

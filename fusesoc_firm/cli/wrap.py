@@ -26,7 +26,7 @@ def add_wrap(commands: Any) -> None:
 
 
 def _wrap(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.wrapper.wrapper import write_wrapper
+    from fusesoc_firm.export.wrapper.wrapper import write_wrapper
 
     made = packaged(arguments, _NETLIST)
     module, *files = write_wrapper(made, arguments.framework, arguments.output)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.component.model import Direction, Generic, Port
-from fusesoc_firm.component.verilog_module import read_module
-from fusesoc_firm.component.vhdl_entity import Entity, read_entity
+from fusesoc_firm.export.component.model import Direction, Generic, Port
+from fusesoc_firm.export.component.verilog_module import read_module
+from fusesoc_firm.export.component.vhdl_entity import Entity, read_entity
 from fusesoc_firm.text.diagnostics import InputError
 
 IN, OUT, INOUT = Direction.IN, Direction.OUT, Direction.INOUT
@@ -163,8 +163,8 @@ def test_an_unknown_module_and_a_fault(tmp_path: Path) -> None:
     ("program", "remedy"), [("ghdl", "GHDL is not installed"), ("yosys", "Yosys is not installed")]
 )
 def test_a_missing_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str, remedy: str) -> None:
-    monkeypatch.setattr("fusesoc_firm.component.vhdl_entity.find", lambda _: None)
-    monkeypatch.setattr("fusesoc_firm.component.verilog_module.find", lambda _: None)
+    monkeypatch.setattr("fusesoc_firm.export.component.vhdl_entity.find", lambda _: None)
+    monkeypatch.setattr("fusesoc_firm.export.component.verilog_module.find", lambda _: None)
     with pytest.raises(InputError, match=remedy) as caught:
         entity(tmp_path) if program == "ghdl" else read_module("filter", [], {}, {})
     assert f"apt-get install --no-install-recommends {program}" in str(caught.value)

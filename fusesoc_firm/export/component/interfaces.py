@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from fusesoc_firm.component.model import AddressBlock, Bus, BusInterface, Direction, Port
+from fusesoc_firm.export.component.model import AddressBlock, Bus, BusInterface, Direction, Port
 from fusesoc_firm.system.hardware.registers import Register
 
 # The logical ports of each bus; those with a minus go from the target to the initiator.

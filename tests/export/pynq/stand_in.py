@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.pynq.driver import Driver
+from fusesoc_firm.export.pynq.driver import Driver
 from tests.node.dma_engine import ADDRESS, Engine, Loop
 
-SPECS = Path(__file__).parents[2] / "specs"
+SPECS = Path(__file__).parents[3] / "specs"
 REGISTERS = 0x4040_0000
 # Two topics to the hardware, and two from it with the same ids and types: a loop in place of the system answers.
 SPECIFICATION = """\

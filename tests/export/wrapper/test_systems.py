@@ -17,12 +17,12 @@ from types import ModuleType
 
 import pytest
 
-from fusesoc_firm.component.package import NETLIST, package
+from fusesoc_firm.export.component.package import NETLIST, package
+from fusesoc_firm.export.wrapper.framework import FRAMEWORKS
+from fusesoc_firm.export.wrapper.wrapper import write_wrapper
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import identity
-from fusesoc_firm.wrapper.framework import FRAMEWORKS
-from fusesoc_firm.wrapper.wrapper import write_wrapper
-from tests.component.designs import alone, designed, write_system
+from tests.export.component.designs import alone, designed, write_system
 from tests.hdl.frames import Frame
 from tests.hdl.ghdl import REPOSITORY
 from tests.hdl.verilator import compiled
@@ -104,7 +104,7 @@ _EXPORTS = {"litex": _litex, "amaranth": _amaranth}
 
 def _run(program: str, *words: object) -> str:
     """What a program of this folder prints."""
-    command = [sys.executable, "-m", f"tests.wrapper.{program}", *map(str, words)]
+    command = [sys.executable, "-m", f"tests.export.wrapper.{program}", *map(str, words)]
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
     return done.stdout

@@ -22,15 +22,15 @@ from migen.fhdl.bitcontainer import value_bits_sign
 from migen.fhdl.structure import ClockSignal, ResetSignal, _Operator
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.component.interfaces import infer
-from fusesoc_firm.component.model import Component, Direction, Generic, Port, SourceFile
-from fusesoc_firm.component.package import NETLIST, package
+from fusesoc_firm.export.component.interfaces import infer
+from fusesoc_firm.export.component.model import Component, Direction, Generic, Port, SourceFile
+from fusesoc_firm.export.component.package import NETLIST, package
+from fusesoc_firm.export.wrapper.framework import FRAMEWORKS
+from fusesoc_firm.export.wrapper.wrapper import wrapper, write_wrapper
 from fusesoc_firm.text.diagnostics import InputError
-from fusesoc_firm.wrapper.framework import FRAMEWORKS
-from fusesoc_firm.wrapper.wrapper import wrapper, write_wrapper
-from tests.component.designs import alone, designed, netlist_ports, write_converter, write_verilog
+from tests.export.component.designs import alone, designed, netlist_ports, write_converter, write_verilog
+from tests.export.wrapper.modules import load
 from tests.hdl.ghdl import REPOSITORY
-from tests.wrapper.modules import load
 
 pytestmark = pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
 Captured = pytest.CaptureFixture[str]

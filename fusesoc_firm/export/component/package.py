@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fusesoc_firm.component.design import Design, is_verilog, is_vhdl, vlnv
-from fusesoc_firm.component.interfaces import infer
-from fusesoc_firm.component.model import Component, Generic, Port, SourceFile
-from fusesoc_firm.component.verilog_module import read_module
-from fusesoc_firm.component.vhdl_entity import Entity, read_entity
+from fusesoc_firm.export.component.design import Design, is_verilog, is_vhdl, vlnv
+from fusesoc_firm.export.component.interfaces import infer
+from fusesoc_firm.export.component.model import Component, Generic, Port, SourceFile
+from fusesoc_firm.export.component.verilog_module import read_module
+from fusesoc_firm.export.component.vhdl_entity import Entity, read_entity
 from fusesoc_firm.netlist.instantiated import entities
 from fusesoc_firm.system.derived.model import StatusAccess
 from fusesoc_firm.system.hardware.registers import Register

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.component.model import Direction, Generic, Port
+from fusesoc_firm.export.component.model import Direction, Generic, Port
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.programs import find, ways
 

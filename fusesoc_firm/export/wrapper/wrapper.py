@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.component.model import Component, Direction, Generic, SourceFile
-from fusesoc_firm.component.package import Package, write_files
+from fusesoc_firm.export.component.model import Component, Direction, Generic, SourceFile
+from fusesoc_firm.export.component.package import Package, write_files
+from fusesoc_firm.export.wrapper.framework import FRAMEWORKS, Framework
+from fusesoc_firm.export.wrapper.sides import capitalised, distinct, sides
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import write
 from fusesoc_firm.text.quoting import python_string
 from fusesoc_firm.text.render import Context, render
-from fusesoc_firm.wrapper.framework import FRAMEWORKS, Framework
-from fusesoc_firm.wrapper.sides import capitalised, distinct, sides
 
 _VERILOG = ("verilogSource", "systemVerilogSource")
 # Pins and clocks belong to the design around the wrapper.

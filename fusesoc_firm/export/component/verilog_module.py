@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.component.model import Direction, Generic, Port
+from fusesoc_firm.export.component.model import Direction, Generic, Port
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.tools.programs import find, ways
 from fusesoc_firm.tools.yosys import Yosys

@@ -11,14 +11,14 @@ from systemrdl.compiler import RDLCompiler
 from systemrdl.node import RegNode
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.component.design import Design
-from fusesoc_firm.component.package import package
-from fusesoc_firm.ip_xact.package import write_package
+from fusesoc_firm.export.component.design import Design
+from fusesoc_firm.export.component.package import package
+from fusesoc_firm.export.ip_xact.package import write_package
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import status_text
-from tests.component.designs import alone, designed, netlist_ports, write_converter, write_system, write_verilog
+from tests.export.component.designs import alone, designed, netlist_ports, write_converter, write_system, write_verilog
+from tests.export.ip_xact.component_file import YEARS, ComponentFile, read_component
 from tests.hdl.ghdl import REPOSITORY
-from tests.ip_xact.component_file import YEARS, ComponentFile, read_component
 
 Captured = pytest.CaptureFixture[str]
 SYSTEMS = (

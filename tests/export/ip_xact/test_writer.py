@@ -8,12 +8,12 @@ from pathlib import Path, PurePosixPath
 import pytest
 from lxml import etree
 
-from fusesoc_firm.component.interfaces import infer
-from fusesoc_firm.component.model import Component, Direction, Generic, Port, SourceFile
-from fusesoc_firm.component.package import Package
-from fusesoc_firm.ip_xact.package import write_package
-from fusesoc_firm.ip_xact.writer import STANDARDS, write_component
-from tests.ip_xact.component_file import YEARS, ComponentFile, read_component
+from fusesoc_firm.export.component.interfaces import infer
+from fusesoc_firm.export.component.model import Component, Direction, Generic, Port, SourceFile
+from fusesoc_firm.export.component.package import Package
+from fusesoc_firm.export.ip_xact.package import write_package
+from fusesoc_firm.export.ip_xact.writer import STANDARDS, write_component
+from tests.export.ip_xact.component_file import YEARS, ComponentFile, read_component
 
 PORTS = [
     Port("clk", Direction.IN),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.component.model import Component
-from fusesoc_firm.component.package import Package, write_files
-from fusesoc_firm.ip_xact.writer import STANDARDS, gui_path, instance_name, write_component
+from fusesoc_firm.export.component.model import Component
+from fusesoc_firm.export.component.package import Package, write_files
+from fusesoc_firm.export.ip_xact.writer import STANDARDS, gui_path, instance_name, write_component
 from fusesoc_firm.text.outputs import write
 from fusesoc_firm.text.render import render
 

@@ -16,15 +16,15 @@ import pytest
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.core.core_reader import read_core
+from fusesoc_firm.export.pynq.driver import ENGINE
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.pynq.driver import ENGINE
 from fusesoc_firm.system.boards.block_design import BLOCK_DESIGN_TEMPLATE, block_design_configuration
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.render import render
-from tests.pynq.stand_in import SPECIFICATION, SPECS, SimpleDma, board, driver_of, installed, written
+from tests.export.pynq.stand_in import SPECIFICATION, SPECS, SimpleDma, board, driver_of, installed, written
 
 BOARDS = ("zynq7000", "zcu104", "kr260")
 SYSTEMS = ("obstacle", "multi_type", "quat2euler", "joint_pid", "mobile_robot", "robotic_arm")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element, SubElement
 
-from fusesoc_firm.component.model import BusInterface, Component, Direction, Generic, Port, SourceFile
+from fusesoc_firm.export.component.model import BusInterface, Component, Direction, Generic, Port, SourceFile
 from fusesoc_firm.system.hardware.registers import Field, Kind, Register
 
 _XILINX = "http://www.xilinx.com"

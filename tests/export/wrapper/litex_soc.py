@@ -1,6 +1,6 @@
 """A SoC of LiteX with a wrapped system, as its builder writes it for Vivado.
 
-    python -m tests.wrapper.litex_soc WRAPPER FOLDER [--without-keep]
+    python -m tests.export.wrapper.litex_soc WRAPPER FOLDER [--without-keep]
 
 The pads of the SoC have the names of the system's ports. Those of the registers lead to the SoC's bus, on which the
 registers are. Without keep, the stream to the system has data alone.
@@ -20,7 +20,7 @@ from litex.soc.integration.soc_core import SoCMini
 from litex.soc.interconnect import stream
 from litex.soc.interconnect.axi import AXILiteInterface, AXIStreamInterface
 
-from tests.wrapper.modules import load
+from tests.export.wrapper.modules import load
 
 ORIGIN = 0x4000_0000
 """The address of the registers."""

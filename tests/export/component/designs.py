@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli.here import core_named
-from fusesoc_firm.component.design import Design, plan_target
+from fusesoc_firm.export.component.design import Design, plan_target
 from fusesoc_firm.tools.programs import find
 from fusesoc_firm.tools.yosys import Yosys
 from tests.hdl.ghdl import REPOSITORY

@@ -6,9 +6,9 @@ import keyword
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from fusesoc_firm.component.model import Bus, BusInterface, Component, Direction, Port
+from fusesoc_firm.export.component.model import Bus, BusInterface, Component, Direction, Port
+from fusesoc_firm.export.wrapper.framework import Domain, Framework
 from fusesoc_firm.text.render import Context
-from fusesoc_firm.wrapper.framework import Domain, Framework
 
 # The names of a component's only streams in both frameworks.
 _STREAMS = {"s_axis": "sink", "m_axis": "source"}

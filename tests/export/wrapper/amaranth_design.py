@@ -1,6 +1,6 @@
 """A design of Amaranth with a wrapped system, as Verilog on the standard output.
 
-    python -m tests.wrapper.amaranth_design WRAPPER [--without-keep]
+    python -m tests.export.wrapper.amaranth_design WRAPPER [--without-keep]
 
 The ports of the design have the names of the system's ports. Without keep, nothing drives that of the stream to the
 system.
@@ -16,7 +16,7 @@ from amaranth.back import verilog
 from amaranth.hdl import ClockDomain, ClockSignal, Elaboratable, Module, ResetSignal, Signal
 from amaranth.lib.wiring import In
 
-from tests.wrapper.modules import load
+from tests.export.wrapper.modules import load
 
 
 class Design(Elaboratable):  # type: ignore[misc]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fusesoc_firm.component.interfaces import infer
-from fusesoc_firm.component.model import Bus, BusInterface, Direction, Port
+from fusesoc_firm.export.component.interfaces import infer
+from fusesoc_firm.export.component.model import Bus, BusInterface, Direction, Port
 
 IN, OUT, INOUT = Direction.IN, Direction.OUT, Direction.INOUT
 

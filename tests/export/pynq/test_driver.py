@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from fusesoc_firm import CodecError, InputError
+from fusesoc_firm.export.pynq.driver import Driver, EngineTransport
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.engine.bursts import AbortedFrameError, BurstError
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 from fusesoc_firm.node.transport.whole_beats import frame_in, in_whole_beats
-from fusesoc_firm.pynq.driver import Driver, EngineTransport
+from tests.export.pynq.stand_in import SPECIFICATION, Board, Channel, SimpleDma, add_files, board, driver_of, written
 from tests.node.dma_engine import DMA_DECODE, MM2S
-from tests.pynq.stand_in import SPECIFICATION, Board, Channel, SimpleDma, add_files, board, driver_of, written
 from tests.seeds import seeded
 
 SEED = seeded(20261201)
@@ -266,7 +266,7 @@ def test_an_overlay_without_the_engine(driver: type[Driver], monkeypatch: pytest
 
 
 def test_memory_that_the_engine_does_not_reach(driver: type[Driver], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tests.pynq.stand_in.Array.physical_address", 2**32 - 4096)
+    monkeypatch.setattr("tests.export.pynq.stand_in.Array.physical_address", 2**32 - 4096)
     with board(monkeypatch), pytest.raises(TransportError, match="the allocated memory ends beyond the 4 GiB"):
         driver()
 
