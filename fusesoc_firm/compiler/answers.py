@@ -47,10 +47,14 @@ class Listed:
 
 @dataclass
 class Sent:
-    """A string or an array of an answer: passed on from an input, made by a loop, listed, or empty."""
+    """A string or an array of an answer: passed on from an input, made by a loop, listed, or empty.
+
+    `absent` leads to what the answer lacks, if it leaves the part out: the part itself, or a message that contains it.
+    """
 
     part: Part | Elements
     value: Stream | Made | Listed | None
+    absent: tuple[str, ...] = ()
 
     def listed(self) -> list[Node]:
         """Return the numbers of all elements that are listed."""
@@ -214,7 +218,7 @@ class AnswerMaker:
                 if not is_fixed or loop.stream.part.count == part.count:
                     return Sent(part, Made(loop, self._element(side, part, element)))
             case None | "" if not is_fixed:
-                return Sent(part, None)
+                return Sent(part, None, self._absent(value, names_of(part.path)) if given is None else ())
             case Array() | tuple():
                 items = given if isinstance(given, tuple) else self.memory.items(given)
                 return Sent(part, self._listed(side, part, items) if items else None)
@@ -224,6 +228,11 @@ class AnswerMaker:
             f"'{name}' is {described(given)}",
             "return a list, pass one of the message on, or append to an empty list in a loop over an array",
         )
+
+    def _absent(self, value: Value, steps: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the steps to the first value that is not in the answer."""
+        lengths = range(1, len(steps) + 1)
+        return next(steps[:length] for length in lengths if self._at(value, steps[:length])[1] is None)
 
     def _listed(self, side: Side, part: Part | Elements, items: Sequence[Value]) -> Listed:
         """Return an array whose elements are in a list."""

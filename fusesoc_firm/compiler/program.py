@@ -153,8 +153,9 @@ def _assumed(task: Task, states: dict[str, Range], error: InputError) -> dict[st
 
 
 def _returned(definition: ast.FunctionDef | ast.Lambda) -> ast.AST:
-    """Return the only expression that a function returns, or the function."""
+    """Return the only expression other than None that a function returns, or the function."""
     found = [item.value for item in ast.walk(definition) if isinstance(item, ast.Return) and item.value]
+    found = [item for item in found if not (isinstance(item, ast.Constant) and item.value is None)]
     return found[0] if len(found) == 1 else definition
 
 
@@ -177,6 +178,9 @@ class _Run:
         self.graph.place = task.source.line(function.definition)
         messages = [message_value(side, self.graph, memory, task.numbers) for side in task.inputs]
         self.node = function.definition
+        # The first parameter of a method is the object.
+        parameters = [item.arg for item in (*self.node.args.posonlyargs, *self.node.args.args)]
+        self.parameters = parameters[1:] if function.owner else parameters
         self.result = self.interpreter.call(function, messages, {}, self.node)
 
     def _function(self) -> Function:
@@ -319,9 +323,11 @@ class _Run:
             )
             for path, leaf in self.leaves.items()
         ]
-        answers = AnswerMaker(self.interpreter, _returned(self.node), self.outputs).answers(self.result)
-        for message, hint in problems(answers, self.interpreter.loops, self.inputs):
-            self.interpreter.refuse(self.node, message, hint)
+        returned = _returned(self.node)
+        answers = AnswerMaker(self.interpreter, returned, self.outputs).answers(self.result)
+        inputs = dict(zip(self.parameters, self.inputs, strict=False))
+        for message, hint in problems(answers, self.interpreter.loops, inputs):
+            self.interpreter.refuse(returned, message, hint)
         program = Program(
             self.name,
             self.interpreter.source,

@@ -7,7 +7,7 @@ answer is sent. So nothing that precedes it may depend on what comes after the s
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 
 from fusesoc_firm.compiler.answers import Answer, Listed, Made, Sent
@@ -50,8 +50,8 @@ def may_be_dropped(answer: Answer) -> bool:
     return is_streamed(answer) and answer.is_conditional
 
 
-def problems(answers: Sequence[Answer], loops: Sequence[Loop], inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:
-    """Yield what would wait for ever, or be read twice, each with its remedy."""
+def problems(answers: Sequence[Answer], loops: Sequence[Loop], inputs: Mapping[str, Side]) -> Iterator[tuple[str, str]]:
+    """Yield what would wait for ever, or be read twice, each with its remedy; `inputs` are those of the parameters."""
     looped = {loop.number for loop in loops}
     streamed = [answer for answer in answers if is_streamed(answer)]
     taken: set[int] = set()
@@ -97,13 +97,20 @@ def _late_name(node: Node, loops: Sequence[Loop]) -> str:
     return re.sub(r"^in\d*_", "", node.payload.port)
 
 
-def _lengths(answer: Answer, inputs: Sequence[Side]) -> Iterator[tuple[str, str]]:
+def _lengths(answer: Answer, inputs: Mapping[str, Side]) -> Iterator[tuple[str, str]]:
     """Yield why the length of an answer is not that of a message."""
-    if all(side.is_fixed or side.frame.message != answer.side.frame.message for side in inputs):
-        yield f"the length of {answer.side.frame.message} is not known", _BUFFERED
+    message = answer.side.frame.message
+    same = [name for name, side in inputs.items() if side.frame.message == message and not side.is_fixed]
+    if not same:
+        yield f"the length of {message} is not known", _BUFFERED
     for sent in answer.parts:
         source = source_of(sent)
-        if source is None or source.path != _name(sent):
+        if sent.absent and any(part.path == sent.part.path for part in inputs[same[0]].parts):
+            *above, field = sent.absent
+            place = f" in '{dotted(above)}'" if above else ""
+            hint = f'write "{field}": {same[0]}.{dotted(sent.absent)}{place}; if it shall be empty, {_BUFFERED}'
+            yield f"the answer has no '{dotted(sent.absent)}', so its length is not that of the message", hint
+        elif source is None or source.path != _name(sent):
             yield f"'{_name(sent)}' has another length than in the message", _BUFFERED
 
 

@@ -10,8 +10,12 @@ from fusesoc_firm.compiler.interface import side_of
 from fusesoc_firm.compiler.kinds import kind_named
 from fusesoc_firm.compiler.program import Task, compile_function
 from fusesoc_firm.compiler.source import Source
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS2
+from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import InputError
 from tests.compiler.compiled import message_frame
+from tests.frame.oracle import parsed
 
 SCAN = message_frame(
     "float32 low\nfloat32[] ranges\nfloat32[] heights\nstring name\nint32 n\nfloat64[4] v\nbool p\n"
@@ -191,6 +195,24 @@ def test_a_length_that_comes_late_is_refused(length: str, answer: str, message: 
     with pytest.raises(InputError, match=message) as raised:
         compiled(f"return {answer}", length)
     assert "length: buffered" in raised.value.diagnostics[0].hint
+
+
+@pytest.mark.parametrize(
+    ("answer", "absent", "remedy"),
+    [
+        ("{'names': scan.names}", "label", r'write "label": scan\.label; '),
+        ("{'label': {}, 'names': scan.names}", "label.text", r"""write "text": scan\.label\.text in 'label'; """),
+        ("{'label': scan.label}", "names", r'write "names": scan\.names; '),
+    ],
+)
+def test_what_an_answer_lacks_is_named_at_its_return(answer: str, absent: str, remedy: str) -> None:
+    texts = {"test_msgs/Labelled": "Label label\nstring[] names\n", "test_msgs/Label": "int32 id\nstring text\n"}
+    frame = frame_of(parse_name("test_msgs/Labelled"), parsed(texts, ROS2))
+    text = f"def f(scan):\n    if scan.label.id < 0:\n        return None\n    return {answer}\n"
+    task = Task(Source("f.py", text), "f", [side_of("in_", frame)], [side_of("out_", frame, "given")])
+    with pytest.raises(InputError, match=rf"^f\.py:4:12: error: the answer has no '{absent}', so its length") as raised:
+        compile_function(task)
+    assert re.match(remedy + "if it shall be empty, .*'length: buffered'", raised.value.diagnostics[0].hint)
 
 
 @pytest.mark.parametrize(
