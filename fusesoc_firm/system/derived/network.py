@@ -149,7 +149,7 @@ def _network(section: NodeNetwork, project: Project, faults: Diagnostics) -> Net
     master = None if section.master is None else _master(section.master, hosts, faults)
     name = _name(section, project, faults)
     if not _NAMESPACE.fullmatch(section.namespace) or len(section.namespace) > _LONGEST_NAME:
-        hint = "legal here: / or an absolute name, such as /arm/left, of up to 255 letters, digits and single '_'"
+        hint = f"legal here: / or, as in /arm/left, up to {_LONGEST_NAME} letters, digits and single '_', letters first"
         faults.error(f"'{section.namespace}' is not a legal namespace", section.namespace.source, hint)
     if not 0 <= section.domain <= _LAST_DOMAIN:
         hint = f"legal here: 0 to {_LAST_DOMAIN}"

@@ -13,7 +13,11 @@ from fusesoc_firm.text.yaml_text import Text
 # The names that both ROS 1 and ROS 2 accept.
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
 _NAME = re.compile(rf"/?{_WORD}(?:/{_WORD})*")
-_LEGAL = "legal here: letters, digits and single '_', as in /arm/left, or in arm/left relative to the node's namespace"
+_FOREIGN = re.compile(r"[^A-Za-z0-9_/]")
+_LEGAL = (
+    "legal here: words that begin with a letter and contain letters, digits and single '_', as in /arm/left, or in "
+    "arm/left relative to the node's namespace"
+)
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,19 @@ def check_topic_name(name: Text, faults: Diagnostics) -> None:
         message = f"topic '{name}' depends on the node's name, which is unknown before the node starts"
         faults.error(message, name.source, _LEGAL)
     elif not _NAME.fullmatch(name):
-        faults.error(f"'{name}' is not a legal topic name", name.source, _LEGAL)
+        faults.error(f"'{name}' is not a legal topic name: {_broken_rule(name)}", name.source, _LEGAL)
+
+
+def _broken_rule(name: str) -> str:
+    """Return the rule that an illegal name breaks."""
+    if foreign := _FOREIGN.search(name):
+        return f"it contains '{foreign[0]}'"
+    if double := next((item for item in ("//", "__") if item in name), ""):
+        return f"it contains '{double}'"
+    if name.endswith("/"):
+        return "it ends with '/'"
+    word = next(item for item in name.removeprefix("/").split("/") if not item[:1].isalpha())
+    return f"'{word}' does not begin with a letter"
 
 
 def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
