@@ -74,7 +74,9 @@ class Names(Paths):
     def _builtin(self, name: str, node: ast.AST) -> Value:
         if hasattr(builtins, name):
             return Named(name)
-        known = [*self.names, *self.definitions] if self._frames else [*self.definitions]
+        # The names of the compiler's own statements begin with '$'.
+        local = [item for item in self.names if not item.startswith("$")] if self._frames else []
+        known = [*local, *self.definitions]
         hint = nearest(name, known)
         if name[0].isupper() and "did you mean" not in hint:
             hint = "a message is a dictionary: {'linear': {'x': 0.0}}"

@@ -343,10 +343,12 @@ class Repetition(Calls):
         if part.ifs:
             self.refuse(part.ifs[0], "the number of elements must be known before the first one", "send all elements")
         array = self.list_of([])
-        append = ast.Call(ast.Attribute(ast.Name("$made", ast.Load()), "append", ast.Load()), [node.elt], [])
+        append = ast.Call(ast.Attribute(ast.Name("$made", ast.Load()), "append", ast.Load()), [], [])
         loop = ast.For(part.target, part.iter, [ast.Expr(append)], [])
         for item in (loop, *ast.walk(append)):
             ast.copy_location(item, node.elt)
+        # The element keeps the places of its parts.
+        append.args.append(node.elt)
         with self._own_names(part.target, **{"$made": array}):
             self._for_stream(loop, over)
             return self.names["$made"]

@@ -65,6 +65,9 @@ BODIES = [
     ("x = @math.clip(m.low, 1.0, 2.0)", "'math.clip' is not hardware", r"use 'min\(max"),
     ("x = @math.inf // m.n", "'//' and '%' of floats", "math.floor"),
     ("x = @missing + 1", "the name 'missing' has no value", ""),
+    ("x = [1.0 + @scale for r in m.ranges]", "the name 'scale' has no value", "^legal here: [a-z, ]*\\bm\\b"),
+    ("x = [r * @scale.y[0] for r in m.v]", "the name 'scale' has no value", "^legal here: [a-z, ]*\\bm\\b"),
+    ("x = sum(r * @scale for r in m.ranges)", "the name 'scale' has no value", "^legal here: [a-z, ]*\\bm\\b"),
     ("x = @m.lwo", "the message has no field 'lwo'", "did you mean 'low'"),
     ("x = m[@'lwo']", "the message has no field 'lwo'", "did you mean 'low'"),
     ("x = @m.ranges[2]", "an array of variable size is not stored", "loop over the array"),
@@ -256,6 +259,15 @@ def test_a_state_is_refused_where_it_is_set(first: str, later: str, message: str
 def test_a_recursion_is_refused_at_its_call() -> None:
     with pytest.raises(InputError, match=r"tried\.py:9:12: error: a recursion is not hardware"):
         compiled("x = again(1)\nreturn {}")
+
+
+@pytest.mark.parametrize("body", ["[r * scale for r in m.ranges]", "min((scale for r in m.ranges), default=1.0)"])
+def test_the_mark_of_a_name_is_as_long_as_the_name(body: str) -> None:
+    with pytest.raises(InputError) as raised:
+        compiled(f"x = {body}\nreturn {{}}")
+    (fault,) = raised.value.diagnostics
+    assert fault.source is not None
+    assert (fault.source.column, fault.source.width) == (9 + body.index("scale"), len("scale"))
 
 
 def test_more_than_forty_constructs_are_refused() -> None:
