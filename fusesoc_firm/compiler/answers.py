@@ -18,11 +18,14 @@ from fusesoc_firm.compiler.interface import Elements, Leaf, Part, Side, places
 from fusesoc_firm.compiler.kinds import INTEGERS, Kind, number_of
 from fusesoc_firm.compiler.paths import Loop
 from fusesoc_firm.compiler.values import Array, Maybe, Memory, Produced, Record, Stream, Unbound, Value, described
-from fusesoc_firm.frame.model import Fixed, Path, all_nodes, names_of
+from fusesoc_firm.frame.model import Data, Fixed, Frame, Path, all_nodes, names_of
+from fusesoc_firm.frame.model import Loop as FrameLoop
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import nearest
 
 _BYTE = 8
+# The ends of the words for the type of an array.
+_ARRAYS = ("]", "messages")
 
 
 @dataclass
@@ -135,16 +138,35 @@ class AnswerMaker:
                 f"the function returns {described(value)}, not a message",
                 "return {'field': value}, or None to send nothing",
             )
-        self._check_names(side.frame.names, value)
+        self._check_names(side.frame, value)
         fields = self._fields(side, side.leaves, value)
         return Answer(side, condition, fields, [self._sent(side, part, value) for part in side.parts])
 
-    def _check_names(self, known: Any, value: Record, path: str = "") -> None:
+    def _check_names(self, frame: Frame, value: Record, names: tuple[str, ...] = ()) -> None:
+        """Refuse a field that the message at the end of `names` lacks, and a message in place of another value."""
+        known: Any = reduce(getitem, names, frame.names)
         for name, item in self.memory.cells[value].items():
+            path = (*names, str(name))
             if name not in known:
-                self._refuse(f"the answer has no field '{path}{name}'", nearest(str(name), [*known]))
-            if isinstance(inner := item.value if isinstance(item, Maybe) else item, Record):
-                self._check_names(known[name], inner, f"{path}{name}.")
+                self._refuse(f"the answer has no field '{dotted(path)}'", nearest(str(name), [*known]))
+            inner = item.value if isinstance(item, Maybe) else item
+            if isinstance(inner, Record):
+                if type_ := _type_words(frame, path):
+                    self._refuse_type(path, type_, inner)
+                self._check_names(frame, inner, path)
+            elif isinstance(inner, tuple | Array) and known[name]:
+                elements = inner if isinstance(inner, tuple) else self.memory.items(inner)
+                for element in elements:
+                    if isinstance(element, Record):
+                        self._check_names(frame, element, path)
+
+    def _refuse_type(self, path: tuple[str, ...], type_: str, given: Value) -> NoReturn:
+        """Refuse a value in the place of one of another type, of which `type_` are the words."""
+        hint = "return a text, or pass one of the message on" if "string" in type_ else "give a number"
+        if type_.endswith(_ARRAYS):
+            hint = "return a list, pass one of the message on, or append to an empty list in a loop over an array"
+        what = f"'{given.path}' of the message" if isinstance(given, Stream) else described(given)
+        self._refuse(f"'{dotted(path)}' is {type_}, and the answer gives {what}", hint)
 
     def _fields(self, side: Side, leaves: Sequence[Leaf], value: Value, skipped: int = 0) -> dict[str, list[Node]]:
         """Return the fields of a message by their ports; `value` is that behind `skipped` steps of their paths."""
@@ -224,10 +246,7 @@ class AnswerMaker:
                 return Sent(part, self._listed(side, part, items) if items else None)
             case str() if isinstance(part, Part) and part.kind is None:
                 return Sent(part, self._text(part, given))
-        return self._refuse(
-            f"'{name}' is {described(given)}",
-            "return a list, pass one of the message on, or append to an empty list in a loop over an array",
-        )
+        return self._refuse_type(names_of(part.path), _type_words(side.frame, names_of(part.path)), given)
 
     def _absent(self, value: Value, steps: tuple[str, ...]) -> tuple[str, ...]:
         """Return the steps to the first value that is not in the answer."""
@@ -269,7 +288,7 @@ class AnswerMaker:
                 self._refuse(f"'{dotted(names)}' is a text, not an array", "return a text, or pass one on")
             return {part.stream: [self._field(value, part.kind, names)]}
         if isinstance(value, Record):
-            self._check_names(reduce(getitem, names, side.frame.names), value, f"{dotted(names)}.")
+            self._check_names(side.frame, value, names)
         for path in part.within:
             _, given = self._at(value, names_of(path)[len(names) :])
             if given not in (None, ""):
@@ -278,6 +297,20 @@ class AnswerMaker:
                     "leave it out, or pass the whole array on",
                 )
         return self._fields(side, part.leaves, value, len(names))
+
+
+def _type_words(frame: Frame, names: tuple[str, ...]) -> str:
+    """Return words for the type of a field, or an empty text for a message."""
+    for node in all_nodes(frame.nodes):
+        if isinstance(node, Data | FrameLoop) and node.names == names:
+            return f"of type {node.ros_type}"
+        for leaf in node.fields if isinstance(node, Fixed) else ():
+            if leaf.names[: len(names)] == names:
+                count = leaf.path[len(names) - 1].count
+                if leaf.names == names:
+                    return f"of type {leaf.type.name}" + ("" if count is None else f"[{count}]")
+                return "" if count is None else f"an array of {count} messages"
+    return ""
 
 
 def _defaults(side: Side, path: Path) -> Sequence[Any]:
