@@ -57,7 +57,7 @@ class Names(Paths):
             case ast.ClassDef():
                 return Class(definition)
             case ast.Import(names=names):
-                return next(Named(item.name) for item in names if name in _names_of(item))
+                return next(Named(item.name if item.asname else name) for item in names if name in _names_of(item))
             case ast.ImportFrom(module=module, names=names):
                 original = next(item.name for item in names if (item.asname or item.name) == name)
                 full = f"{module}.{original}"

@@ -61,6 +61,10 @@ BODIES = [
     ("x = @m.n + 3000000000", "out of the range of int32", "NumPy"),
     ("x = @math.gamma(m.low)", "'math.gamma' is not hardware", "legal here: acos"),
     ("x = @math.sqrt(m.low, 2)", "'math.sqrt' takes 1 numbers", ""),
+    ("x = @wave.open(m.low)", "'wave.open' is not hardware", "^legal here: functions of this file, of math and of"),
+    ("x = @xml.dom.getDOMImplementation(m.low)", "'xml.dom.getDOMImplementation' is not hardware", "of this file"),
+    ("x = @minidom.parse(m.low)", "'xml.dom.minidom.parse' is not hardware", "of this file"),
+    ("x = @xml.sax.parse(m.low)", "'xml.sax.parse' is not hardware", "of this file"),
     ("x = @print(m.n)", "'print' is not hardware", "remove it"),
     ("x = @math.clip(m.low, 1.0, 2.0)", "'math.clip' is not hardware", r"use 'min\(max"),
     ("x = @math.inf // m.n", "'//' and '%' of floats", "math.floor"),
@@ -149,6 +153,10 @@ RETURNS = [
     (_LOOP + "if total > 1.0:\n    return None\nreturn {'ranges': made}", "the condition of the answer", "earlier"),
 ]
 _HEAD = """import math
+import wave
+import xml.dom
+import xml.sax
+import xml.dom.minidom as minidom
 
 
 def helper(y):
@@ -263,7 +271,7 @@ def test_a_state_is_refused_where_it_is_set(first: str, later: str, message: str
 
 
 def test_a_recursion_is_refused_at_its_call() -> None:
-    with pytest.raises(InputError, match=r"tried\.py:9:12: error: a recursion is not hardware"):
+    with pytest.raises(InputError, match=r"tried\.py:13:12: error: a recursion is not hardware"):
         compiled("x = again(1)\nreturn {}")
 
 
