@@ -276,9 +276,9 @@ class _Run:
             self._refuse_state(path, "is lost with a message", "keep the number of elements of lists")
         self._check_settings(after)
         for path, value in after.items():
-            if path not in self.first and path.endswith("]"):
+            if path not in self.first and (grown := self._grown(path)):
                 hint = "use a list of fixed size, and replace its elements"
-                self._refuse_state(path, "grows with each message", hint)
+                self._refuse_state(grown, "grows with each message", hint)
             if path not in self.first:
                 self._refuse_state(path, "has no value before the first message", "give it one in __init__")
             before = self.leaves.get(path, self.first[path])
@@ -298,6 +298,14 @@ class _Run:
             else:
                 self.next[path] = converted(self.graph, value, wanted.kind)
         return found
+
+    def _grown(self, path: str) -> str:
+        """Return the path of the list of which an element that leads to a new value is new, or an empty text."""
+        for index in re.finditer(r"\[\d+\]", path):
+            element = path[: index.end()]
+            if not any(item == element or item.startswith((f"{element}.", f"{element}[")) for item in self.first):
+                return path[: index.start()]
+        return ""
 
     def _widened(self, path: str, first: Node, value: Node) -> Range:
         try:

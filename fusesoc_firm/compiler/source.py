@@ -95,9 +95,15 @@ class Source:
 
 
 def stored_attributes(tree: ast.AST) -> Iterator[ast.Attribute]:
-    """Yield the attributes to which, or to whose elements, functions assign, except for those that construct."""
+    """Yield the attributes to which functions assign or append, also within elements, except when they construct."""
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef) and function.name != "__init__":
-            for target in ast.walk(function):
-                if isinstance(target, ast.Attribute | ast.Subscript) and isinstance(target.ctx, ast.Store):
-                    yield from (node for node in ast.walk(target) if isinstance(node, ast.Attribute))
+            for node in ast.walk(function):
+                match node:
+                    case ast.Attribute(ctx=ast.Store()) | ast.Subscript(ctx=ast.Store()) as changed:
+                        pass
+                    case ast.Call(func=ast.Attribute(value=changed, attr="append")):
+                        pass
+                    case _:
+                        continue
+                yield from (item for item in ast.walk(changed) if isinstance(item, ast.Attribute))

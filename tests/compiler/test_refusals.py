@@ -270,6 +270,27 @@ def test_a_state_is_refused_where_it_is_set(first: str, later: str, message: str
         compile_function(Task(Source("state.py", text), "state", *sides, kind_named("")))
 
 
+@pytest.mark.parametrize(
+    ("first", "change", "column"),
+    [
+        ("self.kept = []", "self.kept.append(m.low)", 9),
+        ("self.kept = []", "self.kept.append({'x': m.low})", 9),
+        ("self.kept = [0.0]", "self.n = self.kept.append(m.low)", 18),
+        ("self.kept = [[0.0], [1.0]]", "self.kept[0].append(m.low)", 9),
+        ("self.kept = []", "self.kept = self.kept + [m.low]", 9),
+        ("pass\n    kept = []", "self.kept.append(m.low)", 9),
+    ],
+)
+def test_a_list_that_grows_is_refused_where_it_grows(first: str, change: str, column: int) -> None:
+    text = f"class Last:\n    def __call__(self, m):\n        {change}\n        return {{}}\n\n"
+    text += f"    def __init__(self):\n        {first}\n\nlast = Last()\n"
+    sides = [side_of("in_", SCAN)], [side_of("out_", ANSWER, "buffered")]
+    place = rf"last\.py:3:{column}: error: 'last\.kept(\[0\])?' grows with each message"
+    with pytest.raises(InputError, match=place) as raised:
+        compile_function(Task(Source("last.py", text), "last", *sides, kind_named("")))
+    assert "fixed size" in raised.value.diagnostics[0].hint
+
+
 def test_a_recursion_is_refused_at_its_call() -> None:
     with pytest.raises(InputError, match=r"tried\.py:13:12: error: a recursion is not hardware"):
         compiled("x = again(1)\nreturn {}")
