@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import importlib.util
 import inspect
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,8 +21,13 @@ from fusesoc_firm.text.diagnostics import SourceRef, closest, fail, nearest
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 """A function in a user's text."""
 
+TIME_LIMIT = 60.0
+"""The most seconds for a call of a user's function, and for the statements of the file."""
+
 _MODULE = "_user_code"
 _OF_ROS = ("rclpy", "rospy", "roslib")
+# An exception can be lost in code that catches all, so it is repeated after these seconds.
+_AGAIN = 1.0
 # Usual names of modules that are not the modules' own.
 _ABBREVIATIONS = {"np": "numpy"}
 
@@ -35,13 +42,15 @@ class UserFunction:
 
     @contextmanager
     def guarded(self, when: str, messages: Sequence[Mapping[str, Any]] = ()) -> Iterator[None]:
-        """Convert exceptions of the function within this context to `InputError`.
+        """Convert exceptions of the function within this context, and a lack of its end, to `InputError`.
 
-        `when` names the occasion, and `messages` are the function's arguments, whose fields are suggested.
+        In the main thread, the function has `TIME_LIMIT` seconds. `when` names the occasion, and `messages` are the
+        function's arguments, whose fields are suggested.
         """
         try:
-            yield
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
+            with _limited():
+                yield
+        except (Exception, SystemExit, _OverdueError) as error:  # noqa: BLE001 - the user's code may raise anything
             _fail_in(place_in(self.path, self._line()), self.what, error, f" for {when}", [*_names(messages)])
 
     def fail(self, message: str, hint: str = "", word: str = "") -> NoReturn:
@@ -107,6 +116,34 @@ def load_compiled(
     return function
 
 
+class _OverdueError(BaseException):
+    """The time of a user's code is over; code that catches `Exception` does not catch this."""
+
+
+def _end(*_: object) -> NoReturn:
+    raise _OverdueError
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Raise `_OverdueError` where this context is after `TIME_LIMIT` seconds, unless a context around it does so.
+
+    Python handles signals in the main thread only: elsewhere, there is no limit.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGALRM) is _end:
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, _end)
+    others = signal.setitimer(signal.ITIMER_REAL, TIME_LIMIT, _AGAIN)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, *others)
+
+
 def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callable[[ModuleType], None]) -> UserFunction:
     """Return a function of a file; `run` runs the file as a module."""
     parameters, hint = form
@@ -119,8 +156,9 @@ def _loaded(path: Path, name: str, what: str, form: tuple[str, str], run: Callab
     # Write no __pycache__ beside the user's file.
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
-        run(module)
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
+        with _limited():
+            run(module)
+    except (Exception, SystemExit, _OverdueError) as error:  # noqa: BLE001 - the user's code may raise anything
         _fail_in(place_in(path, 1), what, error, "")
     finally:
         sys.dont_write_bytecode = writes
@@ -152,6 +190,8 @@ def _fail_in(begin: SourceRef, what: str, error: BaseException, when: str, field
     path = Path(begin.file)
     text = f": {error}" if str(error) else ""
     message = f"{what} raised {type(error).__name__}{when}{text}"
+    if isinstance(error, _OverdueError):
+        message = f"{what} has not ended after {TIME_LIMIT:g} s{when}"
     if isinstance(error, SyntaxError) and error.filename == str(path.absolute()):
         line, column = error.lineno or 1, error.offset or 1
         fail(
@@ -179,6 +219,8 @@ def _cure(error: BaseException, fields: Sequence[str]) -> str:
             return nearest(key, fields)
         case ModuleNotFoundError(name=str(name)):
             return absent_module(name)
+        case _OverdueError():
+            return "if this is a loop, give it an end; it may also wait for something"
     return ""
 
 

@@ -103,11 +103,12 @@ def _lengths(answer: Answer, inputs: Mapping[str, Side]) -> Iterator[tuple[str, 
     same = [name for name, side in inputs.items() if side.frame.message == message and not side.is_fixed]
     if not same:
         yield f"the length of {message} is not known", _BUFFERED
+        return
     for sent in answer.parts:
         source = source_of(sent)
         if sent.absent and any(part.path == sent.part.path for part in inputs[same[0]].parts):
             *above, field = sent.absent
-            place = f" in '{dotted(above)}'" if above else ""
+            place = f" in '{dotted((*above,))}'" if above else ""
             hint = f'write "{field}": {same[0]}.{dotted(sent.absent)}{place}; if it shall be empty, {_BUFFERED}'
             yield f"the answer has no '{dotted(sent.absent)}', so its length is not that of the message", hint
         elif source is None or source.path != _name(sent):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import signal
 import sys
 from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.accelerator import user_code
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
@@ -245,6 +248,43 @@ def test_a_fault_of_the_model_is_shown_in_the_model(tmp_path: Path, text: str, m
     found = fault(tmp_path, text)
     assert found.startswith(message)
     assert "Traceback" not in found
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "when"),
+    [
+        ("def respond(block, m):\n    while True:\n        pass\n", "2|3", " for message 0 to 'sub'"),
+        ("import time\n\ndef respond(block, m):\n    time.sleep(9e6)\n", "4", " for message 0 to 'sub'"),
+        ("def respond(block, m):\n    while True:\n        yield 'left', m\n", "2|3", " for message 0 to 'sub'"),
+        (
+            "def respond(block, m):\n while True:\n  try:\n   m['w']\n  except Exception:\n   pass\n",
+            "[2-6]",
+            " for message 0 to 'sub'",
+        ),
+        ("while True:\n    pass\n", "1|2", ""),
+    ],
+)
+def test_a_model_that_never_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, place: str, when: str
+) -> None:
+    # Loading the file takes a part of the limit.
+    monkeypatch.setattr(user_code, "TIME_LIMIT", 1.0)
+    before = signal.getsignal(signal.SIGALRM), signal.getitimer(signal.ITIMER_REAL)[0] > 0
+    found = fault(tmp_path, text)
+    assert re.match(rf"model\.py:({place}):\d+: error: the model has not ended after 1 s{when}\n", found), found
+    assert (signal.getsignal(signal.SIGALRM), signal.getitimer(signal.ITIMER_REAL)[0] > 0) == before
+
+
+def test_the_limit_is_that_of_a_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limits: list[float] = []
+
+    def set_timer(_: int, seconds: float, again: float = 0.0) -> tuple[float, float]:
+        limits.append(seconds)
+        return 0.0, 0.0
+
+    monkeypatch.setattr(signal, "setitimer", set_timer)
+    ask(tmp_path, "def respond(block, m):\n    return []\n", 1.0, 2.0, 3.0)
+    assert limits.count(60.0) == 1 + 3
 
 
 def test_an_answer_may_omit_fields(tmp_path: Path) -> None:
