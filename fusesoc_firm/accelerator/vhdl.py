@@ -65,6 +65,8 @@ _OPERATORS: dict[str, Callable[[int, int], int]] = {
     "division_operator": lambda left, right: left // right,
     "exponentiation_operator": lambda left, right: left**right,
 }
+LATCH_CURE = "assign it in every branch of its process, or only at a clock edge"
+LOOP_CURE = "break the loop by a register: assign one of its signals at a clock edge"
 _BIT_TYPES = ("std_logic", "std_ulogic")
 
 
@@ -209,13 +211,12 @@ class VhdlReader:
         self, done: subprocess.CompletedProcess[str], paths: Sequence[Path], faults: Diagnostics
     ) -> None:
         """Add warnings about latches and combinational loops: they can be simulated, but they are not synchronous."""
-        sentences = [f"{match[0]}" for match in _LATCH.finditer(done.stderr)]
+        cures = {match[0]: LATCH_CURE for match in _LATCH.finditer(done.stderr)}
         if not done.returncode:
             modules = dump.read(done.stdout)
-            sentences += [*lost_latches(modules), *loops(modules)]
-        cure = "assign it in every branch of its process, or only at a clock edge"
-        for match in filter(None, map(_PLACED.match, sentences)):
-            if (path := Path(match["file"])) in paths:
+            cures |= dict.fromkeys(lost_latches(modules), LATCH_CURE) | dict.fromkeys(loops(modules), LOOP_CURE)
+        for sentence, cure in cures.items():
+            if (match := _PLACED.match(sentence)) and (path := Path(match["file"])) in paths:
                 faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), cure)
 
     def _size_hint(self, path: Path, source: SourceRef) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -284,6 +285,17 @@ def test_a_mistake_in_vhdl_is_one_fault_with_a_cure(old: str, new: str, hint: st
     (fault,) = diagnostics("vhdl", old, new)
     assert not fault.is_warning
     assert hint in fault.hint
+
+
+def test_a_latch_and_a_loop_have_their_own_cures() -> None:
+    """A register breaks a loop, whose signal may be assigned in each branch."""
+    there = "  is_there <= in_msg_valid;"
+    (found,) = diagnostics("vhdl", there, "  is_there <= in_msg_valid xor is_there;")
+    assert "combinational loop in 'img': 'is_there'" in found.message
+    assert found.hint == "break the loop by a register: assign one of its signals at a clock edge"
+    shutil.rmtree("img")
+    (found,) = diagnostics("vhdl", there, _LATCH.format("is_there <= in_msg_valid;"))
+    assert found.hint == "assign it in every branch of its process, or only at a clock edge"
 
 
 def test_faults_in_several_lines_are_all_reported() -> None:
