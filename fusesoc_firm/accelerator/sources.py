@@ -1,16 +1,18 @@
-"""Signals of an accelerator with more than one source, or without a source, in VHDL or Verilog.
+"""Signals of an accelerator with more than one source, without a source, or with an illegal one, in VHDL or Verilog.
 
-GHDL and Yosys find them, but know only the places where they are declared.
+GHDL and Yosys find them, but often know only the places where they are declared.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from pathlib import Path
 
 from fusesoc_firm.accelerator.unit import lines_of, place
+from fusesoc_firm.netlist.loops import waits
+from fusesoc_firm.netlist.model import Modules
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 # A comment in VHDL or Verilog, in one line.
@@ -19,6 +21,7 @@ _COMMENT = re.compile(r"(?:--|//).*")
 _PART = r"({})\s*(?:\[[^\]]*\]|\([^()]*\))?\s*"
 _ASSIGNED = rf"(?:^|[;:)>]|\b(?:assign|begin|then|else)\b)\s*{_PART}(?:<=|=(?![=>]))"
 _CONNECTED = rf"(?:=>\s*|\.\w+\s*\(\s*){_PART}(?:[,)]|$)"
+_PLACED = re.compile(r"(?P<file>.+):(?P<line>\d+):(?P<column>\d+)")
 # A port of a handshake: if it is open, no message passes, and the simulation waits.
 _HANDSHAKE = re.compile(r".*_t?(?:valid|ready)", re.IGNORECASE)
 
@@ -47,6 +50,23 @@ def report_sources(name: str, declared: SourceRef, fault: Fault, faults: Diagnos
     others = ", ".join(dict.fromkeys(str(item.line) for item in found[:-1] if item.line != found[-1].line))
     cure += f", and remove the others; see also line {others}" if others else ""
     faults.error(message.format(name), found[-1] if found else declared, cure)
+
+
+def report_waits(modules: Modules, paths: Sequence[Path], faults: Diagnostics) -> None:
+    """Add a warning for each `valid` of the top module that waits for a `ready`, where it reads the `ready`.
+
+    The receiver's `ready` may wait for the `valid`, so both may wait forever.
+    """
+    for wait in waits(modules):
+        match = _PLACED.fullmatch(wait.location)
+        if match and (path := Path(match["file"])) in paths:
+            source = place(path, int(match["line"]), int(match["column"]))
+        elif found := [item for path in paths for item in _assignments(wait.output, path, 1)]:
+            source = found[-1]
+        else:
+            source = place(paths[-1], 1, 0)
+        hint = f"the receiver may wait for '{wait.output}' before '{wait.input}', so it must not depend on any 'ready'"
+        faults.warn(f"'{wait.output}' waits for '{wait.input}', so no message may ever pass", source, hint)
 
 
 def _assignments(name: str, path: Path, fewest: int) -> list[SourceRef]:

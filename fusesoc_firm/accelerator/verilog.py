@@ -10,8 +10,9 @@ from typing import Any
 
 from fusesoc_firm.accelerator.instances import Instances
 from fusesoc_firm.accelerator.rtlil import read_modules, source_faults
-from fusesoc_firm.accelerator.sources import report_sources
+from fusesoc_firm.accelerator.sources import report_sources, report_waits
 from fusesoc_firm.accelerator.unit import Unit, UnitPort, lines_of, place
+from fusesoc_firm.netlist.elaborated import elaborate
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest
 from fusesoc_firm.tools.yosys import Yosys, is_system_verilog, source_place
 
@@ -61,6 +62,8 @@ class VerilogReader:
         self._warn(done.stderr, faults)
         if not is_system_verilog(paths):
             self._report_sources(paths, top, faults)
+        if module := elaborate(self.yosys, self.yosys.reading(paths), top):
+            report_waits({top: module}, paths, faults)
         interfaces = self.yosys.reading(paths, "-lib")
         modules = {_name(name, module): module for name, module in self.yosys.modules(interfaces).items()}
         parameters = modules.get(top, {}).get("parameter_default_values", {})

@@ -18,7 +18,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, fromstring
 
 from fusesoc_firm.accelerator.instances import size_hint
-from fusesoc_firm.accelerator.sources import Fault, report_sources
+from fusesoc_firm.accelerator.sources import Fault, report_sources, report_waits
 from fusesoc_firm.accelerator.unit import Libraries, Unit, UnitPort, lines_of, place
 from fusesoc_firm.accelerator.vhdl_hints import hint, is_at_end, is_generate, is_syntax, is_unanalysed, missing_clause
 from fusesoc_firm.netlist import dump
@@ -210,7 +210,10 @@ class VhdlReader:
     def _report_latches(
         self, done: subprocess.CompletedProcess[str], paths: Sequence[Path], faults: Diagnostics
     ) -> None:
-        """Add warnings about latches and combinational loops: they can be simulated, but they are not synchronous."""
+        """Add warnings about latches, combinational loops and a `valid` that waits for a `ready`.
+
+        They can be simulated, but latches and loops are not synchronous.
+        """
         cures = {match[0]: LATCH_CURE for match in _LATCH.finditer(done.stderr)}
         if not done.returncode:
             modules = dump.read(done.stdout)
@@ -218,6 +221,8 @@ class VhdlReader:
         for sentence, cure in cures.items():
             if (match := _PLACED.match(sentence)) and (path := Path(match["file"])) in paths:
                 faults.warn(match["text"], place(path, int(match["line"]), int(match["column"])), cure)
+        if not done.returncode:
+            report_waits(modules, paths, faults)
 
     def _size_hint(self, path: Path, source: SourceRef) -> str:
         """Return a hint if a place is in the port map of an entity in another core, whose generics select the size."""

@@ -9,7 +9,7 @@ registered.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -55,6 +55,30 @@ def loops(modules: Modules) -> list[str]:
     for module in modules.values():
         search.reach(module)
     return list(dict.fromkeys(search.found))
+
+
+@dataclass(frozen=True)
+class Wait:
+    """An output of a module that depends on an input without a register in between; `location` is on the way."""
+
+    output: str
+    input: str
+    location: str
+
+
+def waits(modules: Modules) -> Iterator[Wait]:
+    """Yield the outputs of the top module that wait for a `ready`: a `valid` or a `last` that depends on it.
+
+    Only the first `ready` of each output is named.
+    """
+    top = next(module for module in modules.values() if module.is_defined)
+    bits = _Bits(top, _Search(modules))
+    arguments = zip(top.inputs, top.arguments, strict=True)
+    ready = {bit: port.name for port, net in arguments if port.name.endswith("ready") for bit in bits.of(net)}
+    for port, net in zip(top.outputs, top.results, strict=True):
+        if port.name.endswith(("valid", "last")) and (way := bits.way(bits.of(net), ready)):
+            gates = filter(None, (bits.driver[bit] for bit in way))
+            yield Wait(port.name, ready[way[0]], next((gate.location for gate in gates if gate.location), ""))
 
 
 class _Search:
@@ -245,6 +269,23 @@ class _Bits:
             steps.append(_Step(gate, self._index(gate.inputs, bit), self._index(gate.outputs, reader[bit])))
             bit = reader[bit]
         return steps
+
+    def way(self, starts: Sequence[int], ends: Container[int]) -> list[int]:
+        """The shortest path from one of the `ends` to a bit of `starts` that depends on it; empty without a path."""
+        reader = dict.fromkeys(starts, -1)
+        ahead = deque(starts)
+        while ahead:
+            bit = ahead.popleft()
+            if bit in ends:
+                found = [bit]
+                while (bit := reader[bit]) >= 0:
+                    found.append(bit)
+                return found
+            for source in self.sources[bit]:
+                if source not in reader:
+                    reader[source] = bit
+                    ahead.append(source)
+        return []
 
     def _index(self, nets: Iterable[Net | None], bit: int) -> int:
         return next(number for number, net in enumerate(nets) if bit in self.of(net))

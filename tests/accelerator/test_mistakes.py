@@ -131,6 +131,20 @@ VHDL = [
         "",
         "combinational loop in 'img'",
     ),
+    # a valid that waits for a ready
+    (
+        "(others => is_there);",
+        "(others => is_there and out_msg_ready);",
+        "is_there and out_msg_ready",
+        "'out_segment_valid' waits for 'out_msg_ready'",
+    ),
+    ("(others => is_there);", "(others => out_msg_ready);", "valid <= (others", "waits for 'out_msg"),
+    (
+        "(others => is_there);",
+        "(others => is_there and out_msg_ready) when rising_edge(clk);",
+        "",
+        "",
+    ),
     # two sources of a signal
     ("  out_data <= (others => '0');\n", "", "out_data   ", "output 'out_data' has no source"),
     ("begin\n\n", "begin\n  out_data <= in_step;\n", "out_data <= (others", "'out_data' has more than one source"),
@@ -154,6 +168,9 @@ VERILOG = [
     ("is_there && out_msg_ready;", "is_there && out_msg_ready", "assign out_segment_valid", "syntax error"),
     ("in_msg_ready = is_there", "in_msg_ready = is_their", "is_their", "'is_their' is not declared"),
     ("endmodule", "", "", "syntax error"),
+    # a valid that waits for a ready
+    ("{1{is_there}};", "is_there && out_msg_ready;", "is_there &&", "'out_segment_valid' waits for 'out_msg_ready'"),
+    ("{1{is_there}};", "out_msg_ready;", "valid = out", "waits for 'out_msg_ready'"),
     # latches
     (_ZERO, "reg [31:0] r; always @* if (clk) r = in_step; assign out_data = r;", "always", "latch inferred for 'r'"),
     (
@@ -174,6 +191,7 @@ VERILOG = [
 ]
 _COPY = "module copy (input [31:0] i, output [31:0] o); assign o = i; endmodule\n"
 LEGAL_VERILOG = [
+    f"reg r; always @(posedge clk) r <= out_msg_ready; {_ZERO}",
     "assign out_data = in_msg_valid ? 32'bz : 0; assign out_data[0] = 1'bz;",
     _INSTANCE,
     "copy u (.i(in_step), .o({out_data[3:0], out_data[31:4]}));",
