@@ -130,9 +130,10 @@ def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | Non
 def _with_fields(
     chosen: Simulation, faults: Sequence[str], answers: Sequence[Answer], loaded: LoadedSystem | None
 ) -> list[str]:
-    """Return the faults with the fields of wrong bytes and, if they are known, with the values."""
+    """Return the faults with the fields of wrong bytes and, if they are known, with the values and causes."""
     from fusesoc_firm.runs.simulation.answers import with_values
-    from fusesoc_firm.runs.simulation.host_files import with_field
+    from fusesoc_firm.runs.simulation.host_files import NO_BLOCK, with_field
+    from fusesoc_firm.runs.simulation.stalls import stall
 
     paths = [chosen.build.work_root / name for name in ("stimulus.txt", "expected.txt")]
     if loaded is None or not all(path.is_file() for path in paths):
@@ -140,8 +141,14 @@ def _with_fields(
     sent, expected = (path.read_text(encoding="ascii") for path in paths)
     system = loaded.system
     topics = system.subscribers, system.publishers
-    lines = with_values(faults, answers, system.id_bytes)
-    return [with_field(line, (sent, expected), topics, system.id_bytes) for line in lines]
+    stalled = stall(faults, answers, sent, expected)
+    reason = stalled.reason if stalled else NO_BLOCK
+    lines = []
+    for fault in with_values(faults, answers, system.id_bytes):
+        lines.append(with_field(fault, (sent, expected), topics, system.id_bytes, reason))
+        if stalled and fault.startswith(stalled.fault):
+            lines += [f"      = {note}" for note in stalled.notes(system, chosen.build.core)]
+    return lines
 
 
 def _print_messages(

@@ -162,6 +162,11 @@ class _Wanted:
     way: int
 
 
+def expected_causes(text: str) -> list[int | None]:
+    """Return the number of the stimulus that causes each frame in a file of expected frames, or None if unknown."""
+    return [_parts(label)[0] for label, _ in _frames(text)]
+
+
 def _ways(expected: str) -> list[int]:
     """Return the way of each frame in a file of expected frames."""
     found: list[int] = []

@@ -15,6 +15,8 @@ from fusesoc_firm.runs.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import Converter, Topic
 
 SOFTWARE_FILE = "software.txt"
+NO_BLOCK = "no block takes this field or one before it"
+"""Why no more bytes of the first message are taken."""
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
 _AT_BYTE = re.compile(r"fault in cycle \d+: '(?P<label>.*)': (?P<what>byte|only|stops after) (?P<byte>\d+)")
@@ -65,11 +67,12 @@ def with_field(
     texts: tuple[str, str],
     topics: tuple[Iterable[Converter], Iterable[Converter]],
     id_bytes: int = ID_BYTES,
+    reason: str = NO_BLOCK,
 ) -> str:
     """Return a fault of the host with the name of its byte's field, if it is known: `byte 32 (vector.y): ...`.
 
     `texts` are those of the stimulus file and of the file of expected frames, and `topics` the subscribers and the
-    publishers.
+    publishers. `reason` says why no more bytes of a message are taken.
     """
     if (match := _AT_BYTE.match(fault)) is None:
         return fault
@@ -85,9 +88,7 @@ def with_field(
         return fault
     if match["what"] == "byte":
         return f"{fault[: match.end()]} ({name}){fault[match.end() :]}"
-    return (
-        f"{fault}, up to {name}: no block takes this field or one before it" if is_sent else f"{fault}, before {name}"
-    )
+    return f"{fault}, up to {name}: {reason}" if is_sent else f"{fault}, before {name}"
 
 
 def _frame_of(label: str, text: str) -> bytes:
