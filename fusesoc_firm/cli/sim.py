@@ -111,7 +111,7 @@ def _sent(work_root: Path) -> int:
 
 
 def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | None) -> None:
-    from fusesoc_firm.runs.simulation.answers import read_answers, software_answers
+    from fusesoc_firm.runs.simulation.answers import read_answers, software_answers, surplus
 
     answers: Sequence[Answer] = []
     software: Mapping[int, Sequence[Answer]] = {}
@@ -120,9 +120,12 @@ def _print_report(chosen: Simulation, report: Report, loaded: LoadedSystem | Non
         answers = read_answers(chosen.build.work_root, system.subscribers, system.publishers, system.id_bytes)
         software = software_answers(chosen.build.work_root, system)
     print(f"{chosen.build.core} in {SIMULATORS[chosen.simulator].title}, {report.title}")
-    _print_messages(report, answers, software, shown(chosen.build.log))
+    print_messages(report, answers, software, shown(chosen.build.log))
     for line in _with_fields(chosen, report.faults, answers, loaded):
         print(coloured(line, is_good=False))
+    if loaded:
+        for line in surplus(chosen.build.work_root, loaded.system.publishers, loaded.system.id_bytes):
+            print(coloured(line, is_good=False))
     for line in report.summary:
         print(line)
 
@@ -151,7 +154,7 @@ def _with_fields(
     return lines
 
 
-def _print_messages(
+def print_messages(
     report: Report, answers: Sequence[Answer], software: Mapping[int, Sequence[Answer]], log: str
 ) -> None:
     """Print a table of messages: cycles from the first beat in, latency, message and responses, also of `software`.
@@ -167,9 +170,8 @@ def _print_messages(
     responses = "received" if report.is_good else "expected"
     print(f"{'message':>7}  {'cycles':>6}  {'latency':>7}  {'sent':{width}}  {responses}")
     for item, own in (*messages[:_MOST_MESSAGES], *wrong):
-        cycles, latency = (
-            "" if value < 0 and not item.received else str(value) for value in (item.cycles, item.latency)
-        )
+        # They are unknown without a response, and for one that came before its message.
+        cycles, latency = ("", "") if item.cycles < 0 else (str(item.cycles), str(item.latency))
         sent, *received = row(item, [*own, *software.get(item.number, ())], width)
         number = f"{_WRONG if item.is_wrong else ''}{item.number}"
         line = f"{number:>7}  {cycles:>6}  {latency:>7}  {sent:{width}}  {received[0]}"

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.builds.setup.simulation import Message
+from fusesoc_firm.builds.setup.simulation import Message, Report
 from fusesoc_firm.cli.message_table import row, with_answers
+from fusesoc_firm.cli.sim import print_messages
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.frame.layout import frame_of
@@ -109,3 +110,12 @@ def test_answers_belong_to_the_messages_in_the_same_order() -> None:
         Message(2, "sub", ["pub x=3"]),
     ]
     assert [len(own) for _, own in with_answers(messages, answers)] == [2, 1, 0]
+
+
+def test_unknown_cycles_are_blank(capsys: pytest.CaptureFixture[str]) -> None:
+    """A response that came before its message has none."""
+    early, usual = Message(7, "sub a", ["pub x=1"], is_wrong=True), Message(8, "sub b", ["pub x=2"], 30, -4)
+    print_messages(Report(messages=[early, usual]), [], {}, "sim.log")
+    _, first, second = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert first == ["!7", "sub", "a", "pub", "x=1"]
+    assert second == ["8", "30", "-4", "sub", "b", "pub", "x=2"]

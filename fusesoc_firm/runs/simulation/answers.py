@@ -7,7 +7,7 @@ wrong bytes become wrong fields with their values.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -151,6 +151,24 @@ def read_answers(
             pair = Payload(topic, wanted), Payload(topic, _masked(digits[first:], wanted))
             answers.append(Answer(name, cause, None if cause is None else sent[cause], *pair))
     return answers
+
+
+def surplus(folder: Path, publishers: Iterable[Converter], id_bytes: int = ID_BYTES) -> Iterator[str]:
+    """Yield a sentence for each publisher that sent more frames in a simulation than expected."""
+    paths = [folder / name for name in _FILES[1:]]
+    if not all(path.is_file() for path in paths):
+        return
+    expected, received = (
+        Counter(digits[: 2 * id_bytes] for _, digits in _frames(path.read_text(encoding="ascii"))) for path in paths
+    )
+    for item in publishers:
+        digits = item.id.to_bytes(id_bytes, "little").hex()
+        if (more := received[digits] - expected[digits]) > 0:
+            count = f"{more} answer{'s' * (more > 1)} more than the {expected[digits]} expected"
+            yield (
+                f"'{item.block}' sent {count}; likely, a message is used again before its 'msg_ready', "
+                "or an answer's 'segment_valid' stays '1' after its own"
+            )
 
 
 @dataclass(frozen=True)

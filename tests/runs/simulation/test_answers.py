@@ -14,7 +14,7 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.runs.simulation.answers import Answer, read_answers, with_values
+from fusesoc_firm.runs.simulation.answers import Answer, read_answers, surplus, with_values
 from fusesoc_firm.runs.simulation.host_files import expected_text, stimulus_text
 from fusesoc_firm.runs.simulation.reference import Response
 from fusesoc_firm.runs.simulation.stimuli import Stimulus
@@ -122,3 +122,14 @@ def test_other_faults_and_those_without_files_are_kept(tmp_path: Path) -> None:
         "and 3 more faults",
     ]
     assert with_values(faults, answers(tmp_path, "geometry_msgs/Point")) == faults
+
+
+def test_answers_without_a_message_are_counted(tmp_path: Path) -> None:
+    """The host reports each byte of a wrong answer first, and shows few faults."""
+    _, pub = converters("std_msgs/Bool")
+    run(tmp_path, "std_msgs/Bool", {"data": True}, {"data": True})
+    assert [*surplus(tmp_path, [pub])] == []
+    received = tmp_path / "received.txt"
+    received.write_text(received.read_text() * 2 + "< id 07\n  07\n")
+    (told,) = surplus(tmp_path, [pub])
+    assert told.startswith("'pub' sent 2 answers more than the 2 expected; likely, ")
