@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.netlist.elaborated import elaborate
 from fusesoc_firm.netlist.model import Module, NetlistError
 from fusesoc_firm.netlist.verilog import identifier
 from fusesoc_firm.text.render import render
@@ -157,6 +158,14 @@ class Instantiated:
         for cell in (cell for module in modules.values() for cell in module["cells"].values()):
             if (entity := self.entities.get(cell["type"])) and cell["type"] not in modules:
                 yield _use(entity, cell)
+
+    def elaborated(self, name: str) -> Module | None:
+        """Return a module with the defaults of its parameters, or None if Yosys is missing or cannot elaborate it."""
+        if not (program := find("yosys")):
+            return None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        yosys = Yosys(program, self.folder, self.defines)
+        return elaborate(yosys, yosys.reading([Path(file) for file in self._files(name)]), name)
 
     def _files(self, root: str) -> list[str]:
         """Return the files below a module, in the order of the build: Yosys need not read test benches."""

@@ -3,7 +3,7 @@
 Simulators rarely notice a loop; FPGA tools refuse it. The search is bit-exact for gates that only move bits. An
 arithmetic result depends on the operands' bits up to its own, and any other result on all bits of its operands. Every
 module is searched once; its parent uses only the dependencies of outputs on inputs. A module without VHDL counts as
-registered.
+registered, unless it is elaborated.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from math import gcd
+from types import MappingProxyType
 from typing import Final
 
 from fusesoc_firm.netlist.model import Instance, Module, Modules, Net
@@ -49,9 +50,13 @@ _CANDIDATES = 32
 _Reach = Sequence[Sequence[int]]
 
 
-def loops(modules: Modules) -> list[str]:
-    """Return a sentence for each combinational loop: it names instances and their ports, or signals."""
-    search = _Search(modules)
+def loops(modules: Modules, outside: Modules = MappingProxyType({})) -> list[str]:
+    """Return a sentence for each combinational loop: it names instances and their ports, or signals.
+
+    `outside` contains elaborated modules for those that are not defined, by their names; loops within them are not
+    reported.
+    """
+    search = _Search(modules, outside)
     for module in modules.values():
         search.reach(module)
     return list(dict.fromkeys(search.found))
@@ -84,8 +89,9 @@ def waits(modules: Modules) -> Iterator[Wait]:
 class _Search:
     """A search of modules, each once and after the modules that it instantiates."""
 
-    def __init__(self, modules: Modules) -> None:
+    def __init__(self, modules: Modules, outside: Modules = MappingProxyType({})) -> None:
         self.modules: Final = modules
+        self._outside: Final = outside
         self.found: Final[list[str]] = []
         self._known: Final[dict[str, _Reach]] = {}
 
@@ -93,11 +99,22 @@ class _Search:
         """Search a module, and return on which inputs its outputs depend."""
         if module.name not in self._known:
             bits = _Bits(module, self)
-            self._known[module.name] = (
-                bits.reach() if module.is_defined else [[0] * port.width for port in module.outputs]
-            )
+            self._known[module.name] = bits.reach() if module.is_defined else self._reach_outside(module)
             self.found.extend(_sentence(bits, loop) for loop in bits.loops)
         return self._known[module.name]
+
+    def _reach_outside(self, module: Module) -> _Reach:
+        """Return the dependencies of a module that is not defined; without a module of equal ports, it has none."""
+        other = self._outside.get(module.name)
+        if other is None or _sides(other) != _sides(module):
+            return [[0] * port.width for port in module.outputs]
+        reach = dict(zip((port.name.lower() for port in other.outputs), _Bits(other, self).reach(), strict=True))
+        place = {bit: number for number, bit in enumerate(_flat(module))}
+        places = [place[bit] for bit in _flat(other)]
+        return [
+            [sum(1 << places[bit] for bit in _ones(mask)) for mask in reach[port.name.lower()]]
+            for port in module.outputs
+        ]
 
 
 @dataclass(frozen=True)
@@ -294,6 +311,16 @@ class _Bits:
         """The names of the input and of the output of an instance."""
         module = self._search.modules[step.gate.kind]
         return module.inputs[step.input].name, module.outputs[step.output].name
+
+
+def _sides(module: Module) -> tuple[set[tuple[str, int]], ...]:
+    """The names and widths of a module's inputs and outputs; VHDL does not preserve the case."""
+    return tuple({(port.name.lower(), port.width) for port in side} for side in (module.inputs, module.outputs))
+
+
+def _flat(module: Module) -> list[tuple[str, int]]:
+    """The bits of a module's inputs in the order of a mask."""
+    return [(port.name.lower(), bit) for port in module.inputs for bit in range(port.width)]
 
 
 def _ones(mask: int) -> Iterator[int]:

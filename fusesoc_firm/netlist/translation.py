@@ -217,7 +217,16 @@ def find_loops(translation: Translation, folder: Path) -> list[str]:
 
     Raises `NetlistError`.
     """
-    return _padded(lambda ghdl: loops(dump.read(ghdl.synthesise("dump")[0])), translation, folder)
+    return _padded(lambda ghdl: _loops(dump.read(ghdl.synthesise("dump")[0]), translation, folder), translation, folder)
+
+
+def _loops(modules: Modules, translation: Translation, folder: Path) -> list[str]:
+    """Return the loops of a design, also through its modules in Verilog, if Yosys is installed."""
+    found = Instantiated({}, translation.verilog, translation.defines, folder / "verilog")
+    undefined = [module.name for module in modules.values() if not module.is_defined]
+    names = {name: spelt for name in undefined if (spelt := _module(name, translation.verilog))}
+    outside = {name: module for name, spelt in names.items() if (module := found.elaborated(spelt))}
+    return loops(modules, outside)
 
 
 def _padded(made: Callable[[_Ghdl], _T], translation: Translation, folder: Path) -> _T:
@@ -282,7 +291,7 @@ def _netlist(ghdl: _Ghdl, top: str, taken: Container[str]) -> _Part:
     modules = dump.read(text)
     if latches := lost_latches(modules):
         raise NetlistError("\n".join(latches))
-    if ghdl.translation.refuses_loops and (sentences := loops(modules)):
+    if ghdl.translation.refuses_loops and (sentences := _loops(modules, ghdl.translation, ghdl.folder)):
         raise NetlistError("\n".join(sentences))
     components = _components(modules, ghdl.translation.verilog)
     # The second netlist supplies the generics, which the dump lacks.

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.netlist.model import NetlistError
+from fusesoc_firm.netlist.translation import Translation, find_loops
 from tests.hdl.loop_tools import found_by_others
 from tests.hdl.verilog import loops, netlist
 from tests.netlist.test_ghdlsynth import Build
@@ -188,6 +189,26 @@ def test_an_instance_that_is_connected_to_itself_is_named(tmp_path: Path) -> Non
     first = STAGE.format("first", "first", "  in_ready <= out_ready;\n  out_valid <= in_valid;")
     (said,) = found(tmp_path, first=first, second=second, top=TOP)
     assert said.endswith("'out_valid' of 'u_second' depends on its 'out_ready', which is connected to it")
+
+
+@pytest.mark.skipif(not shutil.which("yosys"), reason="no yosys")
+@pytest.mark.parametrize(("valid", "has_loop"), [("in_valid & out_ready", True), ("in_valid", False)])
+def test_a_loop_through_a_module_in_verilog_is_found(tmp_path: Path, valid: str, has_loop: bool) -> None:
+    """Its ports are in another order than the component's."""
+    ports = "input clk, output in_ready, input out_ready, output out_valid, input in_valid"
+    text = f"module First ({ports}); assign out_valid = {valid}; assign in_ready = out_ready; endmodule\n"
+    module = tmp_path / "first.v"
+    module.write_text(text, encoding="ascii")
+    component = (
+        "component first is\n    port (clk, in_valid, out_ready : in std_logic; in_ready, out_valid : out std_logic);"
+    )
+    top = TOP.replace("entity work.first", "first").replace("begin", f"  {component}\n  end component;\nbegin", 1)
+    files = {"second": STAGE.format("second", "second", WAITS), "top": top}
+    for name, content in files.items():
+        (tmp_path / f"{name}.vhd").write_text(content, encoding="ascii")
+    libraries = {"work": [f"{tmp_path}/{name}.vhd" for name in files]}
+    told = find_loops(Translation("top", "", libraries, {}, verilog=[str(module)]), tmp_path / "work")
+    assert ["'out_valid' of 'u_first' depends on its 'out_ready'" in item for item in told] == [True] * has_loop
 
 
 def is_cyclic(sources: Mapping[int, Sequence[int]]) -> bool:
