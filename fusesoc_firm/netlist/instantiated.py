@@ -5,7 +5,7 @@ entity becomes a module that contains a translation for each set of values in us
 
     module firm_float_compare #(parameter EXPONENT_BITS = 11, parameter MANTISSA_BITS = 52) (...);
 
-Yosys elaborates the Verilog and finds the values; it is only needed for Verilog that names an entity.
+Yosys elaborates the Verilog and finds the values; without Yosys, only Verilog that names an entity is refused.
 """
 
 from __future__ import annotations
