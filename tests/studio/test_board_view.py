@@ -226,6 +226,8 @@ def test_a_first_visit_leads_through_three_steps(tmp_path: Path, monkeypatch: py
         await page.until(f"{current}.textContent === '2simulate'")
         await page.until("!document.querySelector('header button:nth-of-type(2)').disabled")
         await press(page, "undo", "header")
+        # Not before the file is as it was; the next visit begins with it.
+        await page.until("document.querySelector('header button:nth-of-type(2)').disabled")
 
     async def second(page: Page) -> None:
         assert await page.evaluate(f"{current}.textContent") == "2simulate"
