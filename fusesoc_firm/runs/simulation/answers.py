@@ -167,7 +167,7 @@ def surplus(folder: Path, publishers: Iterable[Converter], id_bytes: int = ID_BY
             count = f"{more} answer{'s' * (more > 1)} more than the {expected[digits]} expected"
             yield (
                 f"'{item.block}' sent {count}; likely, a message is used again before its 'msg_ready', "
-                "or an answer's 'segment_valid' stays '1' after its own"
+                "or an answer's 'segment_valid' stays high after its own"
             )
 
 

@@ -57,7 +57,7 @@ class Stall:
         if names:
             held = " or ".join(f"'{name}'" for name in names)
             yield f"message {self.message} to '{labels[self.message]}' is not answered: {held} holds it"
-            yield f"likely, one of these stays '0', or a 'tready' of its streams: {', '.join([*taken, *sent])}"
+            yield f"likely, one of these stays low, or a 'tready' of its streams: {', '.join([*taken, *sent])}"
             yield (
                 "an output's valid may not wait for its ready: 'firm check' warns about it, and "
                 f"'firm build {core} --target lint' finds it"
