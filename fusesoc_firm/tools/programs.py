@@ -121,6 +121,12 @@ def simulation_programs(simulator: str) -> tuple[str, ...]:
     return known.programs if known.reads_vhdl else ("ghdl", *known.programs)
 
 
+def has_package(program: str) -> bool:
+    """Return whether Debian or PyPI has a program."""
+    known = PROGRAMS.get(program, Program())
+    return bool(known.debian or known.pypi)
+
+
 def ways(program: str) -> str:
     """Return the commands or instructions with which a missing program can be installed."""
     known = PROGRAMS.get(program, Program())

@@ -30,15 +30,16 @@ def of_wheels(*programs: str, wheel: str) -> list[str]:
     return [*synthesis, *(f"{program}: pip install yowasp-nextpnr-{wheel}" for program in programs)]
 
 
+NVC = ["'nvc' is not installed", "nvc's packages: https://www.nickg.me.uk/nvc"]
 # The message for each target of a system's core.
 SAID = {
     "sim": [f"{APT} ghdl"],
     "sim_icarus": [GHDL, f"iverilog: {APT} iverilog"],
     "sim_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
-    "sim_nvc": ["nvc: nvc's packages: https://www.nickg.me.uk/nvc"],
+    "sim_nvc": NVC,
     "live": [f"{APT} ghdl"],
     "live_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
-    "live_nvc": ["nvc: nvc's packages: https://www.nickg.me.uk/nvc"],
+    "live_nvc": NVC,
     "emulate": [GHDL, VERILATOR, f"g++: {APT} g++"],
     "lint": [GHDL, VERILATOR],
     **{f"synth_{family}": SYNTHESIS for family in ("xilinx", "ecp5", "ice40", "gowin")},

@@ -14,7 +14,7 @@ from fusesoc_firm.builds.call.parameters import Parameter
 from fusesoc_firm.converter.pipeline import PIPELINES
 from fusesoc_firm.core.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.text.naming import PREFIX_RULE, is_library, is_prefix
-from fusesoc_firm.tools.programs import simulation_programs
+from fusesoc_firm.tools.programs import has_package, simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
 
 # The generator of message cores.
@@ -80,7 +80,12 @@ def _load_system(request: Request) -> LoadedRequest:
 
 
 def _simulator_programs(request: Request) -> Sequence[str]:
-    return simulation_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
+    """Return the programs of a simulation, except those without a package, which few machines have.
+
+    Such a machine generates and locks the target all the same; the build names the missing program.
+    """
+    programs = simulation_programs(str(request.parameters["simulator"])) if _is_simulation(request) else ()
+    return [program for program in programs if has_package(program)]
 
 
 def _compiler(request: Request) -> Mapping[str, str]:
